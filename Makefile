@@ -1,0 +1,41 @@
+# LPET. `make demo` and `make test` are all that a fresh clone needs.
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+export MUJOCO_GL ?= egl
+export PYOPENGL_PLATFORM ?= $(MUJOCO_GL)
+
+.PHONY: demo test check bench experiments lock clean opengl env
+
+env: $(STAMP)
+
+$(STAMP): requirements.lock pyproject.toml tools/make_env.sh
+	bash tools/make_env.sh $(PYTHON) $(VENV)
+	@touch $@
+
+opengl: $(STAMP)
+	@bash tools/check_opengl.sh $(BIN)/python
+
+demo: opengl
+	$(BIN)/lpet demo --out out/demo
+
+check: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+test: opengl check
+	$(BIN)/pytest -q -n 2 --dist worksteal
+
+bench: opengl
+	$(BIN)/python -m benchmarks
+
+experiments: opengl
+	$(BIN)/python -m scenarios.experiments
+
+lock: ## needs uv
+	uv pip compile --python-version 3.11 --extra dev --no-header --no-emit-index-url --no-annotate --upgrade pyproject.toml -o requirements.lock
+
+clean:
+	rm -rf $(VENV) out build *.egg-info

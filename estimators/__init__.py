@@ -1,0 +1,1 @@
+"""Estimators: they read measurements alone and give a trajectory with its covariance."""

@@ -1,0 +1,33 @@
+"""The errors that LPET raises: each sentence is built from the values and names what is valid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class LpetError(Exception):
+    """Base of every error that is the user's to mend; the command line exits with code 2."""
+
+
+class SpecError(LpetError):
+    """A spec file or value that is not valid."""
+
+
+class RecordingError(LpetError):
+    """A recording that is missing, truncated, of another schema, or lacks a stream."""
+
+
+class OutputError(LpetError):
+    """A place that cannot be written."""
+
+
+class UnknownNameError(LpetError):
+    """A name that is not among the valid ones."""
+
+    def __init__(self, kind: str, name: str, valid: Iterable[str]) -> None:
+        """Build the sentence from the kind of thing, the name given and the valid names."""
+        super().__init__(f"unknown {kind} '{name}': choose one of {', '.join(sorted(valid))}")
+
+
+class PlanningError(LpetError):
+    """A start, goal or path that cannot be driven."""

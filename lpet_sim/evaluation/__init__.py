@@ -1,0 +1,1 @@
+"""Errors, consistency and the verdict against a requirement."""

@@ -1,0 +1,5 @@
+"""Rotations, rigid motions and planar paths; numpy and scipy only."""
+
+from lpet_sim.geometry.se3 import SE3
+
+__all__ = ["SE3"]

@@ -1,0 +1,166 @@
+"""Measurement streams: what the sensors of a rover deliver, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lpet_sim.errors import RecordingError
+from lpet_sim.recording.arrays import Array, ArrayStruct, Ints
+from lpet_sim.recording.calibration import Calibration
+
+
+@dataclass(frozen=True, eq=False)
+class ImuStream(ArrayStruct):
+    """Inertial measurements in the ``imu`` frame, each the mean over the interval up to its time.
+
+    Attributes:
+        t_ns: End of each interval since the start [ns], Shape (n,).
+        gyro_radps: Body rate [rad/s], Shape (n, 3).
+        accel_mps2: Specific force [m/s^2], Shape (n, 3).
+    """
+
+    t_ns: Ints
+    gyro_radps: Array
+    accel_mps2: Array
+
+
+@dataclass(frozen=True, eq=False)
+class WheelStream(ArrayStruct):
+    """Encoder readings.
+
+    Attributes:
+        t_ns: Times since the start [ns], Shape (n,).
+        drive_angle_rad: Accumulated angle of each wheel, forward positive [rad], Shape (n, w).
+        steer_angle_rad: Steering angle, left positive, 0 where fixed [rad], Shape (n, w).
+    """
+
+    t_ns: Ints
+    drive_angle_rad: Array
+    steer_angle_rad: Array
+
+
+@dataclass(frozen=True, eq=False)
+class SightingStream(ArrayStruct):
+    """Landmark sightings, ragged: those of image i are rows ``offsets[i]:offsets[i + 1]``.
+
+    Attributes:
+        t_ns: Times of the image pairs since the start [ns], Shape (n,).
+        offsets: Row offsets, Shape (n + 1,), int64.
+        landmark_id: Which landmark is seen, Shape (m,), int64; unique within an image.
+        stereo_px: (u_left, u_right, v) [px], Shape (m, 3).
+        sigma_px: Declared noise of each image coordinate, 1 sigma [px], Shape (m,).
+    """
+
+    t_ns: Ints
+    offsets: Ints
+    landmark_id: Ints
+    stereo_px: Array
+    sigma_px: Array
+
+    @classmethod
+    def ragged_fields(cls) -> frozenset[str]:
+        """Name the arrays whose length is not that of ``t_ns``."""
+        return frozenset({"offsets", "landmark_id", "stereo_px", "sigma_px"})
+
+    def __post_init__(self) -> None:
+        """Check the offsets against the rows.
+
+        Raises:
+            RecordingError: Offsets and rows do not fit together.
+        """
+        super().__post_init__()
+        rows = len(self.landmark_id)
+        fits = len(self.offsets) == len(self.t_ns) + 1 and self.offsets[0] == 0
+        if (
+            not fits
+            or self.offsets[-1] != rows
+            or len(self.stereo_px) != rows != len(self.sigma_px)
+        ):
+            raise RecordingError("SightingStream: offsets must run from 0 to the number of rows")
+
+    def rows(self, image: int) -> slice:
+        """Give the rows of one image."""
+        return slice(int(self.offsets[image]), int(self.offsets[image + 1]))
+
+
+class StereoImages(Protocol):
+    """Image pairs read one at a time, so that a long recording never has to fit in memory."""
+
+    @property
+    def t_ns(self) -> Ints:
+        """Times of the pairs since the start [ns], Shape (n,)."""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def pair(self, index: int) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Give the left and right grey image of a pair, Shape (h, w), uint8 or uint16."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ImagesInMemory:
+    """Image pairs held as two arrays.
+
+    Attributes:
+        t_ns: Times since the start [ns], Shape (n,).
+        left: Grey images, Shape (n, h, w), uint8 or uint16.
+        right: Likewise.
+    """
+
+    t_ns: Ints
+    left: NDArray[Any]
+    right: NDArray[Any]
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+    def pair(self, index: int) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Give the left and right image of a pair."""
+        return self.left[index], self.right[index]
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """All that an estimator may know.
+
+    Attributes:
+        calibration: The declared calibration, with the start pose.
+        imu: Inertial measurements, None where there is no unit.
+        wheels: Encoder readings, None where there are none.
+        sightings: Landmark sightings, None until a front end has made them.
+        images: The image pairs, None where they were not kept.
+    """
+
+    calibration: Calibration
+    imu: ImuStream | None = None
+    wheels: WheelStream | None = None
+    sightings: SightingStream | None = None
+    images: StereoImages | None = None
+
+    def require(self, *names: str) -> None:
+        """Hold the measurements to have the named streams.
+
+        Raises:
+            RecordingError: A stream is absent.
+        """
+        streams = ("imu", "wheels", "sightings", "images")
+        present = [name for name in streams if getattr(self, name) is not None]
+        for name in names:
+            if name not in present:
+                hint = (
+                    "; run 'lpet sight' first"
+                    if name == "sightings" and "images" in present
+                    else ""
+                )
+                held = ", ".join(present) or "none"
+                raise RecordingError(f"the recording has no stream '{name}' (it has: {held}){hint}")
+
+
+def concatenate_slices(parts: list[NDArray[np.int64]]) -> Ints:
+    """Make row offsets, Shape (n + 1,), from the landmark ids of n images."""
+    return np.concatenate([[0], np.cumsum([len(part) for part in parts])]).astype(np.int64)

@@ -1,0 +1,1 @@
+"""The rover: its spec, kinematics, scene and drive."""

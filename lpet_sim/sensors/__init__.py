@@ -1,0 +1,1 @@
+"""Inertial unit, wheel odometry and cameras: truth in, measurements out."""

@@ -1,0 +1,1 @@
+"""Images of a recording in, landmark sightings out; needs no simulator."""
