@@ -1,0 +1,1 @@
+"""Where simulation, recordings, estimators and evaluation meet."""
