@@ -1,0 +1,124 @@
+"""The terrain: ground that answers for any patch at any resolution, the same answer each time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lpet_sim.recording.arrays import Array, Ints
+from lpet_sim.rng import stream
+from lpet_sim.terrain.box import Box
+from lpet_sim.terrain.relief import build_relief
+from lpet_sim.terrain.spec import TerrainSpec
+
+if TYPE_CHECKING:
+    from lpet_sim.terrain.rocks import Rocks
+
+
+class Terrain:
+    """Ground, soils, albedo and rocks as pure functions of the plane.
+
+    Attributes:
+        spec: What it was built from.
+        drivable: Where a rover may drive; None: everywhere. A DEM is drivable in its extent only.
+    """
+
+    spec: TerrainSpec
+    drivable: Box | None
+
+    def __init__(self, spec: TerrainSpec, seed: int) -> None:
+        self.spec = spec
+        self.drivable = None
+        self._seed = seed
+        self._layers: list[Any] = [build_relief(spec.relief, stream(seed, "terrain", "relief"))]
+        self._rocks: Any = None
+
+    def height(self, xy: Array, detail_m: float = 0.0) -> Array:
+        """Give the height of the ground without rocks.
+
+        Args:
+            xy: Points in the world [m], Shape (n, 2).
+            detail_m: Leave out what is finer than about twice this [m]; 0 leaves out nothing.
+
+        Returns:
+            Heights [m], Shape (n,); each depends on its own point alone.
+        """
+        points = _points(xy)
+        total = np.zeros(len(points))
+        for layer in self._layers:
+            total += layer.height(points, detail_m)
+        return total
+
+    def normal(self, xy: Array) -> Array:
+        """Give the unit normals of the ground, upwards, from the analytic gradient.
+
+        Args:
+            xy: Points in the world [m], Shape (n, 2).
+
+        Returns:
+            ``(-dz/dx, -dz/dy, 1)`` scaled to length 1, Shape (n, 3).
+        """
+        points = _points(xy)
+        normal = np.ones((len(points), 3))
+        normal[:, :2] = -sum(layer.gradient(points) for layer in self._layers)
+        return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+    def patch(
+        self, x0: int, y0: int, shape: tuple[int, int], cell_m: float, detail_m: float = 0.0
+    ) -> Array:
+        """Give the heights on a grid of nodes; overlapping patches are equal to the bit.
+
+        Args:
+            x0: Index of the first column: node (i, j) is at ``((x0 + j), (y0 + i)) * cell_m``.
+            y0: Index of the first row.
+            shape: Rows and columns, (ny, nx).
+            cell_m: Distance of the nodes [m].
+            detail_m: Leave out what is finer than about twice this [m].
+
+        Returns:
+            Heights [m], Shape (ny, nx); with ``detail_m`` 0 what `height` gives at the nodes.
+        """
+        x = (x0 + np.arange(shape[1])) * cell_m
+        y = (y0 + np.arange(shape[0])) * cell_m
+        nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        return self.height(nodes, detail_m).reshape(shape)
+
+    def soil(self, xy: Array) -> Ints:
+        """Give the index into ``spec.soils`` at points [m], Shape (n, 2) -> (n,)."""
+        return np.zeros(len(xy), dtype=np.int64)
+
+    def albedo(self, xy: Array, texel_m: float) -> Array:
+        """Give the albedo in 0..1 without detail finer than a texel.
+
+        Args:
+            xy: Points in the world [m], Shape (n, 2).
+            texel_m: Distance of the samples [m]; finer detail would alias and is left out.
+
+        Returns:
+            Shape (n,).
+        """
+        return np.full(len(xy), self.spec.albedo.mean)
+
+    def rocks(self, box: Box, min_diameter_m: float = 0.0) -> Rocks:
+        """Give the rocks whose centres lie in a box, of at least a diameter [m]."""
+        from lpet_sim.terrain.rocks import RockField
+
+        if self._rocks is None:
+            self._rocks = RockField(self.spec.rocks, self._seed, self.height)
+        return self._rocks.query(box, min_diameter_m)
+
+
+def build_terrain(spec: TerrainSpec, seed: int) -> Terrain:
+    """Build the terrain that belongs to a spec and a seed.
+
+    Args:
+        spec: What it is made of.
+        seed: Any integer; equal seeds give terrains that are equal to the bit.
+    """
+    return Terrain(spec, seed)
+
+
+def _points(xy: Array) -> NDArray[np.float64]:
+    return np.ascontiguousarray(xy, dtype=np.float64).reshape(-1, 2)
