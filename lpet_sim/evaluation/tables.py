@@ -1,0 +1,122 @@
+"""Scores as tables for a terminal; made here, printed by the command line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rich.table import Table
+from rich.text import Text
+
+from lpet_sim.evaluation.attribution import ErrorAttribution
+from lpet_sim.evaluation.requirement import Requirement, Verdict, VerdictLine
+from lpet_sim.evaluation.result import RunResult
+
+
+def result_table(
+    results: Sequence[RunResult], requirement: Requirement | None = None, title: str | None = None
+) -> Table:
+    """Make a table with one row for each run, and its verdict.
+
+    Args:
+        results: Scores.
+        requirement: What they are held to; the default one if None.
+        title: Title of the table.
+    """
+    requirement = requirement or Requirement()
+    table = Table(title=Text(title) if title else None)
+    table.add_column("estimator")
+    for heading in (
+        "distance\n[m]",
+        "covered\n[%]",
+        "end error\n[m]",
+        "end error\n[% of dist.]",
+        f"worst after {requirement.start_m:g} m\n[% of dist.]",
+        "end roll, pitch, yaw\n[deg]",
+        "worst roll, pitch, yaw\n[deg]",
+        "NEES end\n[6 dof]",
+    ):
+        table.add_column(Text(heading), justify="right")
+    table.add_column("verdict", justify="center")
+    for result in results:
+        table.add_row(
+            Text(result.name), *_row(result), _verdict_text(requirement.check(result), result)
+        )
+    return table
+
+
+def verdict_table(verdict: Verdict) -> Table:
+    """Make a table with one row for each line of a requirement."""
+    table = Table(title=Text(f"{verdict.name}: {verdict.word}"))
+    table.add_column("line")
+    for heading in ("value", "limit", "margin"):
+        table.add_column(Text(heading), justify="right")
+    table.add_column("verdict", justify="center")
+    for line in verdict.lines:
+        numbers = (_quantity(line, x) for x in (line.value, line.limit, line.margin))
+        table.add_row(line.quantity, *numbers, pass_or_fail(line.passed))
+    return table
+
+
+def segment_table(results: Sequence[RunResult]) -> Table:
+    """Make a table of the drift over segments, one row for each run and one column per length."""
+    lengths = sorted({s.length_m for result in results for s in result.segments})
+    table = Table(title=Text("Drift over segments: translation [%], rotation [deg/m]"))
+    table.add_column("estimator")
+    for length in lengths:
+        table.add_column(Text(f"{length:g} m"), justify="right")
+    for result in results:
+        by_length = {s.length_m: s for s in result.segments}
+        cells = (
+            f"{by_length[n].translation_ratio:.3%}, {math.degrees(by_length[n].rotation_radpm):.4f}"
+            if n in by_length
+            else "-"
+            for n in lengths
+        )
+        table.add_row(Text(result.name), *cells)
+    return table
+
+
+def attribution_table(attribution: ErrorAttribution) -> Table:
+    """Make a table of the causes of dead reckoning's endpoint error."""
+    table = Table(title=f"Dead reckoning's error after {attribution.distance_m:.1f} m, by cause")
+    table.add_column("cause")
+    for heading in ("x [m]", "y [m]", "z [m]", "length [m]", "length [% of dist.]"):
+        table.add_column(Text(heading), justify="right")
+    for cause, vector in {**attribution.contributions_m, "total": attribution.total_m}.items():
+        length = math.hypot(*vector)
+        ratio = length / attribution.distance_m
+        table.add_row(cause, *(f"{c:+.4f}" for c in vector), f"{length:.4f}", f"{ratio:.3%}")
+    return table
+
+
+def pass_or_fail(passed: bool) -> Text:
+    """Give the word PASS in green or FAIL in red."""
+    return Text("PASS", style="bold green") if passed else Text("FAIL", style="bold red")
+
+
+def _verdict_text(verdict: Verdict, result: RunResult) -> Text:
+    text = pass_or_fail(verdict.passed)
+    return text.append(f" ({result.failure})") if result.failure else text
+
+
+def _row(result: RunResult) -> list[str]:
+    nees = f"{result.nees_end['pose']:.2f}" if result.nees_end else "-"
+    return [
+        f"{result.distance_m:.2f}",
+        f"{100 * result.completion:.1f}",
+        f"{math.hypot(*result.endpoint_error_m):.4f}",
+        f"{100 * result.endpoint_ratio:.3f}",
+        f"{100 * result.worst_ratio:.3f}",
+        _degrees(result.endpoint_attitude_rad, "+.3f"),
+        _degrees(result.worst_attitude_rad, ".3f"),
+        nees,
+    ]
+
+
+def _degrees(angles_rad: Sequence[float], form: str) -> str:
+    return " ".join(format(math.degrees(angle), form) for angle in angles_rad)
+
+
+def _quantity(line: VerdictLine, value: float) -> str:
+    return f"{100 * value:.3f} %" if line.unit == "ratio" else f"{math.degrees(value):.3f} deg"

@@ -1,0 +1,76 @@
+"""Dead reckoning's error by cause, on planar drives whose causes are known exactly."""
+
+import numpy as np
+import pytest
+
+from lpet_sim.errors import RecordingError
+from lpet_sim.evaluation.attribution import attribute_error
+from lpet_sim.geometry import SE3
+from lpet_sim.recording.arrays import NS_PER_S
+from lpet_sim.recording.streams import WheelStream
+from lpet_sim.recording.trajectory import Trajectory
+from lpet_sim.recording.truth import BodyTruth, Event, Truth, WheelTruth
+
+RADIUS_M, SPEED_MPS, SCALE, SLIP = 0.14, 0.1, 1.02, 0.05
+FORCED = Event(t_ns=round(20.03 * NS_PER_S), kind="forced_slip", duration_s=5.0)
+
+
+def _reckon(wheels: WheelStream) -> Trajectory:
+    """Reckon a straight drive along x from the mean wheel angle."""
+    x = RADIUS_M * (wheels.drive_angle_rad - wheels.drive_angle_rad[0]).mean(axis=1)
+    position = np.stack([x, 0 * x, 0 * x], axis=-1)
+    return Trajectory(wheels.t_ns, SE3(SE3.identity(len(x)).rotation, position))
+
+
+def _drive(side_m: float = 0.0) -> tuple[WheelStream, Truth]:
+    """Drive 100 s: constant wheel speed, constant slip, one forced slip, a slide to the side."""
+    t = np.arange(2001) / 20
+    t_ns = np.round(t * NS_PER_S).astype(np.int64)
+    forced_s = np.clip(t - FORCED.t_ns / NS_PER_S, 0, FORCED.duration_s)
+    angle = np.tile((SPEED_MPS * t / RADIUS_M)[:, None], (1, 6))
+    x = SPEED_MPS * (1 - SLIP) * (t - forced_s)
+    slip = np.full((2001, 6), SLIP)
+    position = np.stack([x, side_m * t / t[-1], 0 * x], axis=-1)
+    zero = np.zeros((2001, 3))
+    body = BodyTruth(t_ns, SE3(SE3.identity(2001).rotation, position), zero, zero.copy())
+    contact = np.ones((2001, 6), dtype=np.uint8)
+    wheels = WheelTruth(t_ns, angle, 0 * angle, slip, 0 * angle, contact, np.zeros((2001, 3)))
+    measured = WheelStream(t_ns, SCALE * angle, 0 * angle)
+    return measured, Truth(body, wheels, (FORCED,))
+
+
+def test_the_parts_sum_to_the_whole() -> None:
+    """The contributions are vectors whose sum is the endpoint error."""
+    measured, truth = _drive(side_m=0.3)
+    split = attribute_error(measured, truth, _reckon)
+    np.testing.assert_allclose(
+        sum(np.array(v) for v in split.contributions_m.values()), split.total_m
+    )
+    error = _reckon(measured).T_world_body.translation[-1] - truth.body.T_world_body.translation[-1]
+    np.testing.assert_allclose(split.total_m, error, atol=1e-12)
+
+
+def test_each_cause_gets_its_closed_form() -> None:
+    """Scale, forced slip, slip and a slide to the side, each its own metres."""
+    measured, truth = _drive(side_m=0.3)
+    parts = attribute_error(measured, truth, _reckon).contributions_m
+    forced_m = SPEED_MPS * FORCED.duration_s
+    np.testing.assert_allclose(parts["scale"], [(SCALE - 1) * 10.0, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(parts["forced_slip"], [forced_m, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(parts["slip"], [SLIP * (10.0 - forced_m), 0, 0], atol=1e-9)
+    np.testing.assert_allclose(parts["model"], [0, -0.3, 0], atol=1e-9)
+
+
+def test_ratios_are_of_the_true_distance() -> None:
+    """Lengths over the distance driven."""
+    measured, truth = _drive()
+    split = attribute_error(measured, truth, _reckon)
+    np.testing.assert_allclose(split.distance_m, 9.5 * 0.95, rtol=1e-9)
+    np.testing.assert_allclose(split.ratios["scale"], 0.2 / split.distance_m, rtol=1e-9)
+
+
+def test_without_true_wheels_nothing_can_be_attributed() -> None:
+    """Imported data say so."""
+    measured, truth = _drive()
+    with pytest.raises(RecordingError, match="no wheels"):
+        attribute_error(measured, Truth(truth.body), _reckon)

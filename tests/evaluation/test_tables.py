@@ -1,0 +1,71 @@
+"""Tables say what the scores are, with units."""
+
+import io
+
+from rich.console import Console
+from rich.table import Table
+
+from lpet_sim.evaluation import Requirement, evaluate, failed
+from lpet_sim.evaluation.attribution import ErrorAttribution
+from lpet_sim.evaluation.tables import (
+    attribution_table,
+    result_table,
+    segment_table,
+    verdict_table,
+)
+from tests.evaluation.trajectories import as_estimate, as_truth, scaled, straight
+
+
+def _text(table: Table) -> str:
+    file = io.StringIO()
+    Console(file=file, width=200, color_system=None).print(table)
+    return file.getvalue()
+
+
+def test_each_run_has_a_row_with_its_verdict_in_colour() -> None:
+    """Green for PASS, red for FAIL, and the failure by name."""
+    truth = straight(20.0, 201)
+    good = evaluate(as_estimate(scaled(truth, 1.005)), as_truth(truth))
+    bad = evaluate(as_estimate(scaled(truth, 1.02)), as_truth(truth))
+    table = result_table([good, bad, failed("broken")])
+    verdicts = list(table.columns[-1].cells)
+    assert [str(verdict) for verdict in verdicts] == ["PASS", "FAIL", "FAIL (exception)"]
+    assert [verdict.style for verdict in verdicts] == ["bold green", "bold red", "bold red"]
+    assert len(_text(table).splitlines()) > 6
+
+
+def test_the_numbers_are_in_the_units_of_the_headings() -> None:
+    """0.5 % of 20 m is 0.1 m."""
+    truth = straight(20.0, 201)
+    text = _text(result_table([evaluate(as_estimate(scaled(truth, 1.005)), as_truth(truth))]))
+    for part in ("[m]", "[% of dist.]", "[deg]", "20.00", "100.0", "0.1000", "0.500"):
+        assert part in text
+
+
+def test_the_verdict_names_every_line_with_limit_and_margin() -> None:
+    """2 % against 1 % has a margin of -1 %."""
+    truth = straight(20.0, 201)
+    result = evaluate(as_estimate(scaled(truth, 1.02)), as_truth(truth))
+    text = _text(verdict_table(Requirement().check(result)))
+    for part in ("position, throughout", "2.000 %", "1.000 %", "-1.000 %", "1.000 deg"):
+        assert part in text
+
+
+def test_segments_are_columns_and_what_does_not_fit_is_a_dash() -> None:
+    """A short run has no long segments."""
+    results = [
+        evaluate(as_estimate(scaled(t, 1.02)), as_truth(t))
+        for t in (straight(4.0, 201), straight(20.0, 201))
+    ]
+    text = _text(segment_table(results))
+    assert "10 m" in text
+    assert "-" in text
+    assert "2.000%, 0.0000" in text
+
+
+def test_the_causes_of_the_error_are_rows() -> None:
+    """Vectors in metres, lengths as a share."""
+    split = ErrorAttribution(10.0, (0.3, 0.4, 0.0), {"scale": (0.3, 0, 0), "slip": (0, 0.4, 0)})
+    text = _text(attribution_table(split))
+    for part in ("scale", "slip", "total", "+0.4000", "5.000%"):
+        assert part in text
