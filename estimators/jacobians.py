@@ -1,0 +1,58 @@
+"""Derivatives of a pose that a body-frame twist moves on: ``T_next = T exp(u)``.
+
+With right perturbations ``T_true = T exp(xi)`` and ``u_true = u + du``, to first order
+``xi_next = Ad(exp(-u)) xi + J_r(u) du``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from lpet_sim.recording.arrays import Array
+
+_TERMS = 8
+
+
+@njit(cache=True)
+def hat(v: Array) -> Array:
+    """Give the skew matrix with ``hat(a) @ b = a x b``, Shape (3, 3)."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+@njit(cache=True)
+def small_adjoint(u: Array) -> Array:
+    """Give ad(u), Shape (6, 6), with ``ad(u) = log Ad(exp(u))``.
+
+    Reference:
+        Barfoot, State Estimation for Robotics (2017), eq. 7.37.
+    """
+    out = np.zeros((6, 6))
+    out[:3, :3] = out[3:, 3:] = hat(u[3:])
+    out[:3, 3:] = hat(u[:3])
+    return out
+
+
+@njit(cache=True)
+def step_jacobians(u: Array) -> tuple[Array, Array]:
+    """Give the derivatives of the next pose's error by the error before and by the step's.
+
+    ``Ad(exp(-u)) = sum (-ad u)^n / n!`` and ``J_r(u) = sum (-ad u)^n / (n + 1)!``, summed until the
+    terms are below 1e-9 for steps of up to 1 (a metre, a radian).
+
+    Args:
+        u: Twist of the step, ``(translation, rotation)`` [m, rad], Shape (6,).
+
+    Returns:
+        ``Ad(exp(-u))`` and ``J_r(u)``, both Shape (6, 6).
+
+    Reference:
+        Barfoot (2017), eq. 7.47 and 7.75 (which has the left Jacobian).
+    """
+    minus = -small_adjoint(u)
+    F, G, term = np.eye(6), np.eye(6), np.eye(6)
+    for n in range(1, _TERMS):
+        term = term @ minus / n
+        F += term
+        G += term / (n + 1)
+    return F, G
