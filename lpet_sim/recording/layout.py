@@ -1,0 +1,37 @@
+"""Names of the entities in a recording's .rrd."""
+
+from __future__ import annotations
+
+from urllib.parse import quote
+
+MANIFEST = "/manifest"
+CALIBRATION = "/calibration"
+
+IMU = "/measurements/imu"
+WHEELS = "/measurements/wheels"
+SIGHTINGS = "/measurements/sightings"
+IMAGE_INDEX = "/measurements/images/index"
+
+TRUTH_BODY = "/truth/body"
+TRUTH_WHEELS = "/truth/wheels"
+EVENTS = "/truth/events"
+EVENT_LOG = "/events"
+
+ESTIMATES = "/estimates"
+ERRORS = "/errors"
+
+ROVER = "/world/rover"
+CAMERAS = {"left": "/world/rover/camera", "right": "/world/rover/camera_right"}
+TERRAIN = "/world/terrain"
+PATHS = "/world/paths"
+SUMMARY = "/summary"
+
+
+def image(eye: str) -> str:
+    """Name the entity of an eye's images."""
+    return f"{CAMERAS[eye]}/image"
+
+
+def slug(name: str) -> str:
+    """Turn a name into one part of an entity's path, different names into different parts."""
+    return quote(name, safe="").replace("%", "_x").replace(".", "_x2E")
