@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.special import expn
 
 from lpet_sim.recording.arrays import Array
-from lpet_sim.terrain.spec import RockAbundanceSpec, RockSizeClass, RockTableSpec
+from lpet_sim.terrain.rock_spec import RockAbundanceSpec, RockSizeClass, RockTableSpec
 
 _TABLE_NODES = 8193
 _STEEPEST_TILT = 500.0

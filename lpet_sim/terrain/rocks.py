@@ -19,7 +19,7 @@ from lpet_sim.terrain.rock_placement import OVERFLOW, place_discs
 from lpet_sim.terrain.rock_set import Rocks
 from lpet_sim.terrain.rock_shapes import SHAPE_COUNT, shape_reaches
 from lpet_sim.terrain.rock_sizes import SizeLaw, size_law
-from lpet_sim.terrain.spec import RockAbundanceSpec, RockTableSpec
+from lpet_sim.terrain.rock_spec import RockAbundanceSpec, RockTableSpec
 
 __all__ = ["RockField", "Rocks"]
 
@@ -88,6 +88,8 @@ class RockField:
         _check_cover(spec, self._law)
         self._side_m = max(_TILE_MIN_M, _TILE_OVER_DIAMETER * self._law.diameter_max_m)
         self._top = math.ceil(math.log2(self._law.diameter_max_m)) - 1
+        octaves = range(_octave(self._law.diameter_min_m), self._top + 1)
+        self._ranks = {octave: _rank_limits(self._law, octave) for octave in octaves}
 
     def query(self, box: Box, min_diameter_m: float = 0.0) -> Rocks:
         """Give the rocks whose centre lies in a box; one outside may still reach into it.
@@ -99,7 +101,7 @@ class RockField:
         Returns:
             The rocks, by tile; the same ids and bits whichever box holds them.
         """
-        bottom = math.floor(math.log2(max(min_diameter_m, self._law.diameter_min_m)))
+        bottom = _octave(max(min_diameter_m, self._law.diameter_min_m))
         reached = box.grown(OVERFLOW * self._side_m)
         tiles = [
             self._tile(octave, i, j)
@@ -129,7 +131,7 @@ class RockField:
     def _grown(self, octave: int, i: int, j: int) -> _Tile:
         """Draw the rocks of one octave in one tile."""
         rng = stream(self._seed, "terrain", "rocks", octave, i, j)
-        rank_max, rank_min = self._ranks(octave)
+        rank_max, rank_min = self._ranks[octave]
         count = int(rng.poisson((rank_max - rank_min) * self._side_m**2))
         if count == 0:
             return _EMPTY
@@ -154,11 +156,6 @@ class RockField:
         if not placed.all():
             logger.warning("no free place for %d rocks in tile (%d, %d)", np.sum(~placed), i, j)
         return _taken(replace(tile, discs=np.column_stack([xy, reach])), placed)
-
-    def _ranks(self, octave: int) -> tuple[float, float]:
-        """Rocks per m^2 at least as large as the octave's lower and upper limit."""
-        low, high = self._law.count_above(np.array([2.0**octave, 2.0 ** (octave + 1)]))
-        return float(low), float(high)
 
     def _obstacles(self, octave: int, i: int, j: int) -> Array:
         """Discs that a tile's rocks must keep clear of, Shape (m, 3)."""
@@ -204,6 +201,16 @@ def _width_of(tile: _Tile) -> Array:
 
 def _between(limits: tuple[float, float], uniform: Array) -> Array:
     return limits[0] + (limits[1] - limits[0]) * uniform
+
+
+def _octave(diameter_m: float) -> int:
+    return math.floor(math.log2(diameter_m))
+
+
+def _rank_limits(law: SizeLaw, octave: int) -> tuple[float, float]:
+    """Rocks per m^2 at least as large as the octave's lower and upper limit."""
+    low, high = law.count_above(np.array([2.0**octave, 2.0 ** (octave + 1)]))
+    return float(low), float(high)
 
 
 def _colour(i: int, j: int) -> int:
