@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -68,10 +68,12 @@ def read_yaml(path: Path) -> object:
 def _first_problem(cls: type[BaseModel], error: ValidationError) -> str:
     """Turn pydantic's first complaint into one sentence that names what is valid."""
     problem = error.errors(include_url=False)[0]
-    where = ".".join(str(part) for part in problem["loc"])
+    owner, inside, where = _follow(cls, problem["loc"])
     if problem["type"] == "extra_forbidden":
-        owner = _model_at(cls, problem["loc"][:-1])
         return f"unknown key '{where}'; valid keys are {', '.join(owner.model_fields)}"
+    if problem["type"] == "union_tag_not_found":
+        kinds = sorted({str(tag) for model in inside for tag in _tags(model) - {model.__name__}})
+        return f"'{where}' lacks {problem['ctx']['discriminator']}: one of {', '.join(kinds)}"
     given = f", got {problem['input']!r}" if _is_short(problem["input"]) else ""
     return f"'{where or 'spec'}': {problem['msg']}{given}"
 
@@ -80,14 +82,35 @@ def _is_short(value: object) -> bool:
     return isinstance(value, int | float | str | bool) or value is None
 
 
-def _model_at(cls: type[BaseModel], loc: tuple[int | str, ...]) -> type[BaseModel]:
-    """Follow an error's location to the nested model whose key was unknown."""
-    model = cls
+def _follow(
+    cls: type[BaseModel], loc: tuple[int | str, ...]
+) -> tuple[type[BaseModel], list[type[BaseModel]], str]:
+    """Follow an error's location to the nested model that owns its last key.
+
+    Pydantic puts the tag of the chosen member of a union into the location, which is no key of the
+    file: it picks the member here and is left out of the path.
+
+    Returns:
+        The model, the models that may stand under the key, and the path of keys in the file.
+    """
+    owner, inside, keys = cls, [cls], list[str]()
     for part in loc:
-        field = model.model_fields.get(str(part))
-        candidates = _models_in(field.annotation) if field is not None else []
-        model = candidates[0] if candidates else model
-    return model
+        tagged = [model for model in inside if part in _tags(model)] if keys else []
+        if tagged:
+            inside = tagged[:1]
+            continue
+        keys.append(str(part))
+        if isinstance(part, str) and inside:
+            owner = inside[0]
+            field = owner.model_fields.get(part)
+            inside = _models_in(field.annotation) if field is not None else []
+    return owner, inside, ".".join(keys)
+
+
+def _tags(model: type[BaseModel]) -> set[object]:
+    """Give what pydantic may call a member of a union: its name, or a literal that tells it."""
+    literals = (get_args(field.annotation) for field in model.model_fields.values())
+    return {model.__name__, *(tag for tags in literals for tag in tags if isinstance(tag, str))}
 
 
 def _models_in(annotation: object) -> list[type[BaseModel]]:

@@ -74,12 +74,10 @@ class SightingStream(ArrayStruct):
         """
         super().__post_init__()
         rows = len(self.landmark_id)
+        counts = np.diff(self.offsets)
         fits = len(self.offsets) == len(self.t_ns) + 1 and self.offsets[0] == 0
-        if (
-            not fits
-            or self.offsets[-1] != rows
-            or len(self.stereo_px) != rows != len(self.sigma_px)
-        ):
+        fits = fits and self.offsets[-1] == rows and bool(np.all(counts >= 0))
+        if not fits or len(self.stereo_px) != rows or len(self.sigma_px) != rows:
             raise RecordingError("SightingStream: offsets must run from 0 to the number of rows")
 
     def rows(self, image: int) -> slice:

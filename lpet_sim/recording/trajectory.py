@@ -48,9 +48,9 @@ class Trajectory(ArrayStruct):
                 f"times {query.min()} to {query.max()} ns lie outside the trajectory, "
                 f"which spans {self.t_ns[0]} to {self.t_ns[-1]} ns"
             )
-        right = np.clip(np.searchsorted(self.t_ns, query, side="left"), 1, len(self) - 1)
-        left = right - 1
-        span = (self.t_ns[right] - self.t_ns[left]).astype(float)
+        right = np.searchsorted(self.t_ns, query, side="left")
+        left = np.maximum(right - 1, 0)
+        span = np.maximum(self.t_ns[right] - self.t_ns[left], 1)
         fraction = (query - self.t_ns[left]) / span
         p = self.T_world_body.translation
         R = self.T_world_body.rotation

@@ -1,0 +1,125 @@
+"""Specs: frozen, to YAML and back, and every mistake in one clear sentence."""
+
+from pathlib import Path
+from typing import Literal
+
+import pytest
+from pydantic import Field, ValidationError
+
+from lpet_sim.errors import SpecError
+from lpet_sim.spec import Spec
+
+
+class Lens(Spec):
+    """An inner spec."""
+
+    focal_px: float = Field(default=800.0, gt=0)
+
+
+class Box(Spec):
+    """Another inner spec, one of a union."""
+
+    kind: Literal["box"] = "box"
+    edge_m: float = 1.0
+
+
+class Ball(Spec):
+    """The other of the union."""
+
+    kind: Literal["ball"] = "ball"
+    radius_m: float = 1.0
+
+
+class Device(Spec):
+    """An outer spec."""
+
+    name: str = "mast"
+    lens: Lens = Lens()
+    lenses: tuple[Lens, ...] = ()
+    spare: Lens | None = None
+    shape: Box | Ball = Field(default=Box(), discriminator="kind")
+
+
+def _sentence(mapping: object) -> str:
+    with pytest.raises(SpecError) as caught:
+        Device.from_mapping(mapping, source="device.yaml")
+    return str(caught.value)
+
+
+def test_a_spec_goes_to_yaml_and_back(tmp_path: Path) -> None:
+    """Nested ones, tuples and the chosen one of a union too."""
+    device = Device(lens=Lens(focal_px=1223.0), lenses=(Lens(), Lens(focal_px=2)), shape=Ball())
+    device.to_yaml(tmp_path / "device.yaml")
+    assert Device.from_yaml(tmp_path / "device.yaml") == device
+
+
+def test_a_spec_cannot_be_changed() -> None:
+    """Neither by a known name nor by a new one."""
+    device = Device()
+    with pytest.raises(ValidationError, match="frozen"):
+        device.name = "other"  # type: ignore[misc]
+    with pytest.raises(ValidationError):
+        device.other = 1  # type: ignore[attr-defined]
+
+
+def test_an_unknown_key_names_the_valid_ones() -> None:
+    """At the top."""
+    sentence = _sentence({"lense": {}})
+    assert sentence.startswith(
+        "device.yaml: unknown key 'lense'; valid keys are name, lens, lenses"
+    )
+
+
+def test_an_unknown_key_inside_names_the_keys_of_the_inner_spec() -> None:
+    """Of a nested one, of an optional one, of one in a list and of the one chosen of a union."""
+    assert "'lens.focal'; valid keys are focal_px" in _sentence({"lens": {"focal": 1}})
+    assert "'spare.focal'; valid keys are focal_px" in _sentence({"spare": {"focal": 1}})
+    assert "'lenses.1.focal'; valid keys are focal_px" in _sentence({"lenses": [{}, {"focal": 1}]})
+    union = _sentence({"shape": {"kind": "ball", "edge_m": 1}})
+    assert "unknown key 'shape.edge_m'; valid keys are kind, radius_m" in union
+
+
+def test_a_value_out_of_range_names_the_field_the_limit_and_the_value() -> None:
+    """One sentence of one line."""
+    sentence = _sentence({"lens": {"focal_px": -3.0}})
+    assert sentence == "device.yaml: 'lens.focal_px': Input should be greater than 0, got -3.0"
+
+
+def test_a_value_of_the_wrong_type_and_one_that_is_not_finite_are_refused() -> None:
+    """Words for numbers, and infinities."""
+    assert "'lens.focal_px'" in _sentence({"lens": {"focal_px": "long"}})
+    assert "finite" in _sentence({"lens": {"focal_px": float("inf")}})
+    assert "'box', 'ball'" in _sentence({"shape": {"kind": "cone"}})
+    assert "'shape' lacks 'kind': one of ball, box" in _sentence({"shape": {}})
+
+
+def test_a_file_that_holds_no_mapping_is_refused(tmp_path: Path) -> None:
+    """An empty file or a list is not a spec."""
+    for text in ("", "- 1\n", "word"):
+        path = tmp_path / "device.yaml"
+        path.write_text(text)
+        with pytest.raises(SpecError, match=r"device\.yaml"):
+            Device.from_yaml(path)
+
+
+def test_a_missing_file_a_folder_and_what_is_not_yaml_are_named(tmp_path: Path) -> None:
+    """The sentence has the path and the reason."""
+    with pytest.raises(SpecError, match=r"cannot read .*none.yaml: No such file"):
+        Device.from_yaml(tmp_path / "none.yaml")
+    with pytest.raises(SpecError, match="Is a directory"):
+        Device.from_yaml(tmp_path)
+    (tmp_path / "bad.yaml").write_text("a: [1, 2\nb: }")
+    with pytest.raises(SpecError, match="not valid YAML") as caught:
+        Device.from_yaml(tmp_path / "bad.yaml")
+    assert "\n" not in str(caught.value)
+    (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00\x80")
+    with pytest.raises(SpecError, match="not valid YAML"):
+        Device.from_yaml(tmp_path / "binary.yaml")
+
+
+def test_a_mistake_leaves_no_trace_of_the_library() -> None:
+    """No addresses of documentation, one line."""
+    for mapping in ({"x": 1}, {"lens": {"focal_px": 0}}, {"lens": 3}, []):
+        sentence = _sentence(mapping)
+        assert "http" not in sentence
+        assert "\n" not in sentence
