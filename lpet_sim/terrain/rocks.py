@@ -40,9 +40,10 @@ BURIED_FRACTION = (0.4, 0.6)
 ALBEDO = (0.10, 0.24)
 """Range of a rock's albedo, from bare basalt to dust-coated [recalled]."""
 
-_TILES_KEPT = 20_000
+_ROCKS_KEPT = 200_000
+_TILES_KEPT = 50_000
 _TILE_MIN_M = 4.0
-_TILE_OVER_DIAMETER = 4.0
+_REACH_OVER_DIAMETER = 0.85
 _UNIFORMS = 7
 
 
@@ -54,6 +55,45 @@ class _Tile:
     discs: Array
     diameter_m: Array
     uniforms: Array
+
+
+@dataclass(frozen=True)
+class _Octave:
+    """Rocks of diameters within a factor of two, and the tiles that they are drawn in.
+
+    Attributes:
+        ranks: Rocks per m^2 at least as large as the lower and the upper limit.
+        side_m: Side of a tile: over twice any two reaches, and wider than the largest rock, which
+            else could fill a tile whose rocks then had no place [m].
+        reach_m: Largest reach of a rock [m].
+    """
+
+    ranks: tuple[float, float]
+    side_m: float
+    reach_m: float
+
+    @classmethod
+    def of(cls, law: SizeLaw, octave: int) -> _Octave:
+        """Lay out the octave from 2^octave to 2^(octave + 1) m of a size law."""
+        low, high = law.count_above(np.array([2.0**octave, 2.0 ** (octave + 1)]))
+        largest_m = min(2.0 ** (octave + 1), law.diameter_max_m)
+        side_m = max(_TILE_MIN_M, 4.0 * largest_m, 1.6 * law.diameter_max_m)
+        return cls((float(low), float(high)), side_m, _REACH_OVER_DIAMETER * largest_m)
+
+    def ground(self, i: int, j: int) -> Box:
+        """Give the box that a tile's rocks may have their centres in."""
+        low, high = -OVERFLOW * self.side_m, (1.0 + OVERFLOW) * self.side_m
+        x, y = i * self.side_m, j * self.side_m
+        return Box(x + low, y + low, x + high, y + high)
+
+    def places(self, box: Box) -> list[tuple[int, int]]:
+        """Name the tiles whose rocks may have their centres in a box."""
+        reached = box.grown(OVERFLOW * self.side_m)
+        rows = self._range(reached.y_min, reached.y_max)
+        return [(i, j) for j in rows for i in self._range(reached.x_min, reached.x_max)]
+
+    def _range(self, low_m: float, high_m: float) -> range:
+        return range(math.floor(low_m / self.side_m), math.floor(high_m / self.side_m) + 1)
 
 
 class RockField:
@@ -86,10 +126,10 @@ class RockField:
         self._law = size_law(spec)
         self._tiles: OrderedDict[tuple[int, int, int], _Tile] = OrderedDict()
         _check_cover(spec, self._law)
-        self._side_m = max(_TILE_MIN_M, _TILE_OVER_DIAMETER * self._law.diameter_max_m)
+        self._rocks_kept = 0
         self._top = math.ceil(math.log2(self._law.diameter_max_m)) - 1
         octaves = range(_octave(self._law.diameter_min_m), self._top + 1)
-        self._ranks = {octave: _rank_limits(self._law, octave) for octave in octaves}
+        self._octaves = {octave: _Octave.of(self._law, octave) for octave in octaves}
 
     def query(self, box: Box, min_diameter_m: float = 0.0) -> Rocks:
         """Give the rocks whose centre lies in a box; one outside may still reach into it.
@@ -102,23 +142,18 @@ class RockField:
             The rocks, by tile; the same ids and bits whichever box holds them.
         """
         bottom = _octave(max(min_diameter_m, self._law.diameter_min_m))
-        reached = box.grown(OVERFLOW * self._side_m)
         tiles = [
-            self._tile(octave, i, j)
+            self._tile(octave, *place)
             for octave in range(self._top, bottom - 1, -1)
-            for j in self._rows(reached.y_min, reached.y_max)
-            for i in self._rows(reached.x_min, reached.x_max)
+            for place in self._octaves[octave].places(box)
         ]
         self._forget()
         return self._built([_cropped(tile, box, min_diameter_m) for tile in tiles])
 
-    def _rows(self, low_m: float, high_m: float) -> range:
-        return range(math.floor(low_m / self._side_m), math.floor(high_m / self._side_m) + 1)
-
     def _forget(self) -> None:
         """Drop the tiles asked for longest ago, so that memory stays flat over a long drive."""
-        while len(self._tiles) > _TILES_KEPT:
-            self._tiles.popitem(last=False)
+        while self._rocks_kept > _ROCKS_KEPT or len(self._tiles) > _TILES_KEPT:
+            self._rocks_kept -= len(self._tiles.popitem(last=False)[1].id)
 
     def _tile(self, octave: int, i: int, j: int) -> _Tile:
         key = (octave, i, j)
@@ -126,13 +161,14 @@ class RockField:
             self._tiles.move_to_end(key)
         else:
             self._tiles[key] = self._grown(octave, i, j)
+            self._rocks_kept += len(self._tiles[key].id)
         return self._tiles[key]
 
     def _grown(self, octave: int, i: int, j: int) -> _Tile:
         """Draw the rocks of one octave in one tile."""
         rng = stream(self._seed, "terrain", "rocks", octave, i, j)
-        rank_max, rank_min = self._ranks[octave]
-        count = int(rng.poisson((rank_max - rank_min) * self._side_m**2))
+        rank_max, rank_min = self._octaves[octave].ranks
+        count = int(rng.poisson((rank_max - rank_min) * self._octaves[octave].side_m ** 2))
         if count == 0:
             return _EMPTY
         uniforms = rng.random((count, _UNIFORMS))
@@ -150,8 +186,9 @@ class RockField:
     def _placed(self, tile: _Tile, keys: Ints, octave: int, i: int, j: int) -> _Tile:
         """Find a free place for each rock of a tile, the largest first."""
         reach = shape_reaches()[_shape_of(tile)] * tile.diameter_m / np.sqrt(_width_of(tile))
-        corner = np.array([i, j]) * self._side_m
-        xy = place_discs(reach, keys, self._obstacles(octave, i, j), corner, self._side_m)
+        side_m = self._octaves[octave].side_m
+        corner = np.array([i, j]) * side_m
+        xy = place_discs(reach, keys, self._obstacles(octave, i, j), corner, side_m)
         placed = np.isfinite(xy[:, 0])
         if not placed.all():
             logger.warning("no free place for %d rocks in tile (%d, %d)", np.sum(~placed), i, j)
@@ -159,16 +196,16 @@ class RockField:
 
     def _obstacles(self, octave: int, i: int, j: int) -> Array:
         """Discs that a tile's rocks must keep clear of, Shape (m, 3)."""
-        around = [(i + di, j + dj) for dj in (-1, 0, 1) for di in (-1, 0, 1)]
-        larger = [
-            self._tile(above, *place).discs
-            for above in range(self._top, octave, -1)
-            for place in around
+        own = self._octaves[octave]
+        tiles = [
+            self._tile(octave, *place)
+            for place in [(i + di, j + dj) for dj in (-1, 0, 1) for di in (-1, 0, 1)]
+            if _colour(*place) < _colour(i, j)
         ]
-        earlier = [
-            self._tile(octave, *place).discs for place in around if _colour(*place) < _colour(i, j)
-        ]
-        return np.concatenate([np.empty((0, 3)), *larger, *earlier])
+        for above in range(self._top, octave, -1):
+            near = own.ground(i, j).grown(own.reach_m + self._octaves[above].reach_m)
+            tiles += [self._tile(above, *place) for place in self._octaves[above].places(near)]
+        return np.concatenate([_EMPTY.discs, *(tile.discs for tile in tiles)])
 
     def _built(self, tiles: list[_Tile]) -> Rocks:
         """Work out shape, pose and look of the rocks of some tiles."""
@@ -205,12 +242,6 @@ def _between(limits: tuple[float, float], uniform: Array) -> Array:
 
 def _octave(diameter_m: float) -> int:
     return math.floor(math.log2(diameter_m))
-
-
-def _rank_limits(law: SizeLaw, octave: int) -> tuple[float, float]:
-    """Rocks per m^2 at least as large as the octave's lower and upper limit."""
-    low, high = law.count_above(np.array([2.0**octave, 2.0 ** (octave + 1)]))
-    return float(low), float(high)
 
 
 def _colour(i: int, j: int) -> int:
