@@ -1,0 +1,176 @@
+"""The rules of the house, read off the syntax trees: each gives the places that break it."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("lpet_sim", "estimators")
+
+FOUNDATION = {"errors", "rng", "spec", "datasets", "outputs", "progress"}
+PHYSICAL = {"terrain", "rover", "sensors", "planning"}
+MAY_IMPORT: dict[str, set[str]] = {
+    "foundation": set(),
+    "geometry": set(),
+    "recording": {"foundation", "geometry"},
+    "vision": {"foundation", "geometry", "recording"},
+    "evaluation": {"foundation", "geometry", "recording"},
+    "estimators": {"foundation", "geometry", "recording", "evaluation"},
+    "terrain": {"foundation", "geometry", "recording"},
+    "rover": {"foundation", "geometry", "recording", "terrain"},
+    "sensors": {"foundation", "geometry", "recording", "terrain", "rover"},
+    "planning": {"foundation", "geometry", "recording", "terrain", "rover"},
+}
+MAY_IMPORT["sweep"] = {*MAY_IMPORT} - {"sweep"}
+MAY_IMPORT["tradeoff"] = {*MAY_IMPORT}
+MAY_IMPORT["study"] = {*MAY_IMPORT}
+MAY_IMPORT["cli"] = {*MAY_IMPORT}
+"""Which rooms each room may import, besides itself."""
+
+QUARANTINE: dict[str, set[str]] = {
+    "mujoco": {
+        "lpet_sim/rover/mjcf.py",
+        "lpet_sim/rover/scene.py",
+        "lpet_sim/sensors/render_scene.py",
+    },
+    "ompl": {"lpet_sim/planning/route.py"},
+    "cv2": {"lpet_sim/vision/detect.py"},
+    "rerun": {"lpet_sim/recording/store.py", "lpet_sim/recording/visuals.py"},
+    "trimesh": {"lpet_sim/terrain/rock_shapes.py"},
+    "rasterio": {"lpet_sim/terrain/dem.py"},
+    "typer": {"lpet_sim/cli.py"},
+}
+"""The files that may import a library, so that its upgrade touches one room."""
+
+GEOMETRY_LIBRARIES = {"numpy", "scipy", "__future__", "collections", "dataclasses", "typing"}
+SEEDED = {"Generator", "PCG64", "BitGenerator", "SeedSequence"}
+BANNED_NAMES = re.compile(r"^(get_|process_|handle_)|Manager$|^utils?$")
+COVARIANCE = re.compile(r"^(P|cov|covariance)(_\w+)?$")
+
+
+def sources() -> dict[str, str]:
+    """Give the text of every source file of the product by its path in the repository."""
+    found = (path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py")))
+    return {path.relative_to(ROOT).as_posix(): path.read_text() for path in found}
+
+
+def room_of(module: str) -> str:
+    """Give the room of a module such as ``lpet_sim.rover.scene``."""
+    parts = module.split(".")
+    if parts[0] == "estimators":
+        return "estimators"
+    name = parts[1] if len(parts) > 1 else "foundation"
+    return "foundation" if name in FOUNDATION or name.startswith("__") else name
+
+
+def module_of(path: str) -> str:
+    """Give the module of a source file."""
+    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
+def imports(text: str) -> Iterator[tuple[int, str]]:
+    """Give line and full name of everything imported, wherever in the file the import stands."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level:
+            yield node.lineno, "." * node.level
+        elif isinstance(node, ast.ImportFrom):
+            yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+
+
+def import_order_breaks(path: str, text: str) -> list[str]:
+    """Find imports of a room that this file's room may not know, and relative ones."""
+    room = room_of(module_of(path))
+    if room not in MAY_IMPORT:
+        return [f"{path}: room '{room}' has no place in the import order"]
+    allowed = {room, *MAY_IMPORT[room]}
+    ours = ((n, name) for n, name in imports(text) if name.split(".")[0] in (*PACKAGES, ""))
+    return [f"{path}:{n} imports {name}" for n, name in ours if room_of(name) not in allowed]
+
+
+def quarantine_breaks(path: str, text: str) -> list[str]:
+    """Find imports of a quarantined library outside its files."""
+    tops = ((n, name.split(".")[0]) for n, name in imports(text))
+    return [
+        f"{path}:{n} imports {top}" for n, top in tops if path not in QUARANTINE.get(top, {path})
+    ]
+
+
+def geometry_breaks(path: str, text: str) -> list[str]:
+    """Find what geometry imports beyond numpy, scipy and itself."""
+    allowed = (*GEOMETRY_LIBRARIES, "lpet_sim")
+    return [f"{path}:{n} imports {m}" for n, m in imports(text) if m.split(".")[0] not in allowed]
+
+
+def randomness_breaks(path: str, text: str) -> list[str]:
+    """Find generators that are not made by ``lpet_sim.rng.stream``, and the global ones."""
+    found = [f"{path}:{n} imports {m}" for n, m in imports(text) if m.split(".")[0] == "random"]
+    for node in ast.walk(ast.parse(text)):
+        of_random = isinstance(node, ast.Attribute) and ast.unparse(node.value).endswith(".random")
+        if of_random and ast.unparse(node.value) in ("np.random", "numpy.random"):
+            assert isinstance(node, ast.Attribute)
+            if node.attr not in SEEDED:
+                found.append(f"{path}:{node.lineno} uses {ast.unparse(node)}")
+    banned = (f"{path}:{n} imports {m}" for n, m in imports(text) if m.startswith("numpy.random."))
+    return found + [line for line in banned if line.rsplit(".", 1)[1] not in SEEDED]
+
+
+def print_breaks(path: str, text: str) -> list[str]:
+    """Find calls of print, and pyplot, whose figures are global."""
+    nodes = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Call)]
+    calls = [n.lineno for n in nodes if isinstance(n.func, ast.Name) and n.func.id == "print"]
+    pyplot = [n for n, name in imports(text) if name.startswith("matplotlib.pyplot")]
+    return [f"{path}:{n} prints" for n in calls] + [f"{path}:{n} imports pyplot" for n in pyplot]
+
+
+def name_breaks(path: str, text: str) -> list[str]:
+    """Find names that say nothing: get_, process_, handle_, Manager, utils."""
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    names = [(n.lineno, n.name) for n in ast.walk(ast.parse(text)) if isinstance(n, kinds)]
+    names.append((1, Path(path).stem))
+    return [f"{path}:{n} names {x}" for n, x in names if BANNED_NAMES.search(x.lstrip("_"))]
+
+
+def seed_breaks(path: str, text: str) -> list[str]:
+    """Find specs that hold a seed."""
+    classes = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.ClassDef)]
+    specs = [c for c in classes if any(ast.unparse(base).endswith("Spec") for base in c.bases)]
+    fields = [f for c in specs for f in c.body if isinstance(f, ast.AnnAssign)]
+    return [f"{path}:{f.lineno} holds a seed" for f in fields if "seed" in ast.unparse(f.target)]
+
+
+def quaternion_breaks(path: str, text: str) -> list[str]:
+    """Find SciPy's rotations, whose quaternions are scalar last, outside ``so3.py``."""
+    if path == "lpet_sim/geometry/so3.py":
+        return []
+    found = (n for n, name in imports(text) if name.startswith("scipy.spatial.transform"))
+    return [f"{path}:{n} imports SciPy's rotations" for n in found]
+
+
+def covariance_breaks(path: str, text: str) -> list[str]:
+    """Find estimators that write into a covariance outside ``gaussian.py``."""
+    if not path.startswith("estimators/") or path == "estimators/gaussian.py":
+        return []
+    found = []
+    for node in ast.walk(ast.parse(text)):
+        targets = node.targets if isinstance(node, ast.Assign) else []
+        written = [t.value for t in targets if isinstance(t, ast.Subscript)]
+        written += [node.target] if isinstance(node, ast.AugAssign) else []
+        names = (ast.unparse(target).split("[")[0].split(".")[-1] for target in written)
+        found += [f"{path}:{node.lineno} writes {x}" for x in names if COVARIANCE.match(x)]
+    return found
+
+
+def body_lengths(text: str) -> dict[tuple[int, str], int]:
+    """Give the lines of every function's body without its docstring, by line and name."""
+    out = {}
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef):
+            body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+            if body and ast.unparse(body[0]) != "...":
+                out[node.lineno, node.name] = (body[-1].end_lineno or 0) - body[0].lineno + 1
+    return out
