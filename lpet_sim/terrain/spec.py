@@ -47,14 +47,14 @@ class ReliefSpec(Spec):
         hurst: Exponent H; 0.7-0.9 on Mars, 0.88 measured on the Gale HiRISE DTM.
         rms_slope_rad: Arc tangent of the RMS height difference over 1 m [rad]; 3-8 deg on Mars,
             6.5 deg measured on the Gale DTM.
-        outer_scale_m: Wavelength beyond which the spectrum is flat, so that heights stay bounded
-            (von Karman) [m]. A choice.
+        outer_scale_m: Wavelength at which the law ends, so that heights stay bounded [m]. A
+            choice.
         inner_scale_m: Shortest wavelength synthesised [m]; finer grain is albedo. A choice.
     """
 
     hurst: Hurst = 0.8
     rms_slope_rad: Annotated[float, Field(ge=0.0, lt=0.7)] = math.radians(5.0)
-    outer_scale_m: Annotated[float, Field(ge=50.0, le=5000.0)] = 1000.0
+    outer_scale_m: Annotated[float, Field(ge=50.0, le=5000.0)] = 500.0
     inner_scale_m: Annotated[float, Field(ge=0.02, le=1.0)] = 0.08
 
 
@@ -198,7 +198,7 @@ class DemSpec(Spec):
     origin_column_px: float | None = None
     origin_row_px: float | None = None
     datum_m: float | None = None
-    resolved_m: Annotated[float, Field(gt=0.2)] = 8.0
+    resolved_m: Annotated[float, Field(gt=0.2)] = 6.0
     blend_m: Annotated[float, Field(ge=5.0)] = 60.0
 
 

@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.rng import stream
+from lpet_sim.terrain.albedo import build_albedo
 from lpet_sim.terrain.box import Box
-from lpet_sim.terrain.relief import build_relief
+from lpet_sim.terrain.craters import build_craters
+from lpet_sim.terrain.dem import DemGround, build_dem
+from lpet_sim.terrain.far import build_hills
+from lpet_sim.terrain.relief import Bands, build_relief
+from lpet_sim.terrain.rocks import RockField, Rocks
+from lpet_sim.terrain.soil import build_soil
 from lpet_sim.terrain.spec import TerrainSpec
 
-if TYPE_CHECKING:
-    from lpet_sim.terrain.rocks import Rocks
+
+class Layer(Protocol):
+    """Something that adds to the height of the ground."""
+
+    def height(self, xy: Array, detail_m: float = 0.0) -> Array:
+        """Give heights at points [m], Shape (n, 2) -> (n,)."""
+        ...
+
+    def gradient(self, xy: Array) -> Array:
+        """Give (dz/dx, dz/dy) at points [m], Shape (n, 2) -> (n, 2)."""
+        ...
 
 
 class Terrain:
@@ -30,10 +45,12 @@ class Terrain:
 
     def __init__(self, spec: TerrainSpec, seed: int) -> None:
         self.spec = spec
-        self.drivable = None
-        self._seed = seed
-        self._layers: list[Any] = [build_relief(spec.relief, stream(seed, "terrain", "relief"))]
-        self._rocks: Any = None
+        ground = _build_ground(spec, seed)
+        self.drivable = ground.extent if isinstance(ground, DemGround) else None
+        self._layers: list[Layer] = [ground, *_build_features(spec, seed)]
+        self._soils = build_soil(spec, stream(seed, "terrain", "soil"))
+        self._albedo = build_albedo(spec, seed, self._soils)
+        self._rocks = RockField(spec.rocks, seed, self.height)
 
     def height(self, xy: Array, detail_m: float = 0.0) -> Array:
         """Give the height of the ground without rocks.
@@ -61,8 +78,10 @@ class Terrain:
             ``(-dz/dx, -dz/dy, 1)`` scaled to length 1, Shape (n, 3).
         """
         points = _points(xy)
-        normal = np.ones((len(points), 3))
-        normal[:, :2] = -sum(layer.gradient(points) for layer in self._layers)
+        normal = np.zeros((len(points), 3))
+        normal[:, 2] = 1.0
+        for layer in self._layers:
+            normal[:, :2] -= layer.gradient(points)
         return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
     def patch(
@@ -87,7 +106,7 @@ class Terrain:
 
     def soil(self, xy: Array) -> Ints:
         """Give the index into ``spec.soils`` at points [m], Shape (n, 2) -> (n,)."""
-        return np.zeros(len(xy), dtype=np.int64)
+        return self._soils.soil(_points(xy))
 
     def albedo(self, xy: Array, texel_m: float) -> Array:
         """Give the albedo in 0..1 without detail finer than a texel.
@@ -99,14 +118,10 @@ class Terrain:
         Returns:
             Shape (n,).
         """
-        return np.full(len(xy), self.spec.albedo.mean)
+        return self._albedo.albedo(_points(xy), texel_m)
 
     def rocks(self, box: Box, min_diameter_m: float = 0.0) -> Rocks:
         """Give the rocks whose centres lie in a box, of at least a diameter [m]."""
-        from lpet_sim.terrain.rocks import RockField
-
-        if self._rocks is None:
-            self._rocks = RockField(self.spec.rocks, self._seed, self.height)
         return self._rocks.query(box, min_diameter_m)
 
 
@@ -118,6 +133,20 @@ def build_terrain(spec: TerrainSpec, seed: int) -> Terrain:
         seed: Any integer; equal seeds give terrains that are equal to the bit.
     """
     return Terrain(spec, seed)
+
+
+def _build_ground(spec: TerrainSpec, seed: int) -> Bands | DemGround:
+    rng = stream(seed, "terrain", "relief")
+    return build_dem(spec.dem, spec.relief, rng) if spec.dem else build_relief(spec.relief, rng)
+
+
+def _build_features(spec: TerrainSpec, seed: int) -> list[Layer]:
+    features: list[Layer] = []
+    if spec.craters:
+        features.append(build_craters(spec.craters, stream(seed, "terrain", "craters")))
+    if spec.far:
+        features.append(build_hills(spec.far, stream(seed, "terrain", "hills")))
+    return features
 
 
 def _points(xy: Array) -> NDArray[np.float64]:
