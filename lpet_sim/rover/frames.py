@@ -1,0 +1,99 @@
+"""Frames, wheels and joints of a rover, read from its MJCF: the model is their only source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lpet_sim.geometry import SE3
+from lpet_sim.recording.arrays import Array
+from lpet_sim.rover.mjcf import WHEELS, bare_model
+from lpet_sim.rover.spec import RoverSpec
+
+
+@dataclass(frozen=True)
+class RoverFrames:
+    """Where things are on the rover, with its suspension and steering at zero.
+
+    Attributes:
+        T_body_imu: Pose of the inertial unit.
+        T_body_camera: Pose of the left eye (optical: x right, y down, z forward).
+        T_body_camera_right: Pose of the right eye.
+        wheel_names: Names of the wheels; their order everywhere.
+        wheel_position_body_m: Centres of the wheels in the body [m], Shape (6, 3).
+        wheel_radius_m: Radius of the wheels [m].
+        steer_limit_rad: Largest steering angle of each wheel [rad], Shape (6,).
+        suspension_joints: Names of the joints of `WheelTruth.joint_angle_rad`, in its order.
+        mass_kg: Mass of the whole rover [kg].
+        gravity_mps2: Magnitude of gravity in the model [m/s^2].
+    """
+
+    T_body_imu: SE3
+    T_body_camera: SE3
+    T_body_camera_right: SE3
+    wheel_names: tuple[str, ...]
+    wheel_position_body_m: Array
+    wheel_radius_m: float
+    steer_limit_rad: Array
+    suspension_joints: tuple[str, ...]
+    mass_kg: float
+    gravity_mps2: float
+
+    @property
+    def contact_body_m(self) -> Array:
+        """Lowest points of the wheels in the body, on flat ground at rest [m], Shape (6, 3)."""
+        return self.wheel_position_body_m - [0.0, 0.0, self.wheel_radius_m]
+
+    @property
+    def stereo_baseline_m(self) -> float:
+        """Distance between the eyes [m]."""
+        step = self.T_body_camera.translation - self.T_body_camera_right.translation
+        return float(np.linalg.norm(step))
+
+    @property
+    def ride_height_m(self) -> float:
+        """Height of the body's origin above flat ground at rest [m]."""
+        return float(-self.contact_body_m[:, 2].mean())
+
+
+def rover_frames(spec: RoverSpec) -> RoverFrames:
+    """Read the frames of a rover from its MJCF.
+
+    Raises:
+        UnknownNameError: There is no such rover model.
+    """
+    model = bare_model(spec.model)
+    joints = [model.joint(i).name for i in range(model.njnt)]
+    return RoverFrames(
+        T_body_imu=site_pose(spec, "imu"),
+        T_body_camera=site_pose(spec, "camera"),
+        T_body_camera_right=site_pose(spec, "camera_right"),
+        wheel_names=WHEELS,
+        wheel_position_body_m=np.array([body_pose(spec, f"wheel_{w}").translation for w in WHEELS]),
+        wheel_radius_m=float(model.geom("wheel_front_left").size[0]),
+        steer_limit_rad=np.array([model.joint(f"steer_{w}").range[1] for w in WHEELS]),
+        suspension_joints=tuple(name for name in joints if name.startswith("bogie_")),
+        mass_kg=float(model.body("body").subtreemass[0]),
+        gravity_mps2=float(-model.opt.gravity[2]),
+    )
+
+
+def body_pose(spec: RoverSpec, name: str) -> SE3:
+    """Give ``T_body_link`` of a link of the rover, with every joint at zero."""
+    model = bare_model(spec.model)
+    root = model.body("body").id
+    index = model.body(name).id
+    pose = SE3.identity()
+    while index != root:
+        pose = SE3.from_quat_wxyz(model.body_quat[index], model.body_pos[index]) @ pose
+        index = model.body_parentid[index]
+    return pose
+
+
+def site_pose(spec: RoverSpec, name: str) -> SE3:
+    """Give ``T_body_site`` of a site of the rover, with every joint at zero."""
+    model = bare_model(spec.model)
+    site = model.site(name)
+    owner = model.body(int(site.bodyid[0])).name
+    return body_pose(spec, owner) @ SE3.from_quat_wxyz(site.quat, site.pos)

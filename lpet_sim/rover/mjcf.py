@@ -1,0 +1,137 @@
+"""Rover models: find them, read them, and compile them together with a piece of ground.
+
+One of the two files of the room that import MuJoCo; the other is `scene`.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from lpet_sim.errors import UnknownNameError
+from lpet_sim.rover.ground import CELL_M, RANGE_M, GroundPatch, RocksLike
+
+WHEELS = ("front_left", "front_right", "middle_left", "middle_right", "rear_left", "rear_right")
+_FLOOR_M = 1.0
+
+
+def models_folder() -> Path:
+    """Give the folder of the rover models, beside the package in the source tree."""
+    return Path(__file__).resolve().parents[2] / "models"
+
+
+def model_path(name: str) -> Path:
+    """Give the file of a rover model.
+
+    Args:
+        name: File name without its ending, as in ``exomars``.
+
+    Raises:
+        UnknownNameError: There is no such model.
+    """
+    valid = sorted(path.stem for path in models_folder().glob("*.xml"))
+    if name not in valid:
+        raise UnknownNameError("rover model", name, valid)
+    return models_folder() / f"{name}.xml"
+
+
+@lru_cache(maxsize=4)
+def bare_model(name: str) -> mujoco.MjModel:
+    """Compile a rover by itself, without any ground; not to be written to."""
+    return mujoco.MjModel.from_xml_path(str(model_path(name)))
+
+
+@lru_cache(maxsize=4)
+def _source(name: str) -> str:
+    return model_path(name).read_text()
+
+
+def compile_on(name: str, dt_s: float, patch: GroundPatch, rocks: RocksLike) -> mujoco.MjModel:
+    """Compile a rover with the ground under it and the rocks near it.
+
+    The joints, actuators and sensors do not depend on the ground, so a state carries over from one
+    compiled model to the next. The heights are written after compiling, because the compiler
+    would stretch them to 0..1.
+
+    Args:
+        name: The rover model.
+        dt_s: Physics step [s].
+        patch: The ground.
+        rocks: Convex rocks, each a geom of its own.
+    """
+    spec = mujoco.MjSpec.from_string(_source(name))
+    spec.option.timestep = dt_s
+    _add_ground(spec, patch)
+    for k in range(len(rocks.id)):
+        _add_rock(spec, rocks, k)
+    for wheel in WHEELS:
+        spec.add_sensor(
+            name=f"soil_{wheel}",
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_GEOM,
+            objname=f"wheel_{wheel}",
+            reftype=mujoco.mjtObj.mjOBJ_GEOM,
+            refname="ground",
+            intprm=[1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1],
+        )
+    model = spec.compile()
+    model.hfield_data[:] = patch.data.ravel()
+    return model
+
+
+def _add_ground(spec: mujoco.MjSpec, patch: GroundPatch) -> None:
+    nodes = len(patch.data)
+    spec.add_hfield(
+        name="ground",
+        nrow=nodes,
+        ncol=nodes,
+        size=[patch.half_m, patch.half_m, RANGE_M, _FLOOR_M],
+        userdata=np.zeros(nodes * nodes, dtype=np.float32),
+    )
+    assert patch.half_m * 2 == (nodes - 1) * CELL_M
+    spec.worldbody.add_geom(
+        name="ground",
+        type=mujoco.mjtGeom.mjGEOM_HFIELD,
+        hfieldname="ground",
+        pos=[*patch.centre_xy, patch.base_m],
+        contype=1,
+        conaffinity=2,
+    )
+
+
+def _add_rock(spec: mujoco.MjSpec, rocks: RocksLike, k: int) -> None:
+    vertices, faces = rocks.mesh(k)
+    name = f"rock_{int(rocks.id[k])}"
+    spec.add_mesh(
+        name=name,
+        uservert=np.asarray(vertices, dtype=float).ravel(),
+        userface=np.asarray(faces, dtype=np.int32).ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
+    )
+    spec.worldbody.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        pos=rocks.p_world_rock[k],
+        contype=1,
+        conaffinity=2,
+    )
+
+
+VISUAL_GROUP = 1  # group of the geoms that are drawn; those that collide are in group 3
+
+
+def geom_kind(model: mujoco.MjModel, geom: int) -> str:
+    """Give the kind of a drawn geom: ``box`` or ``cylinder``, the only two that models use.
+
+    Raises:
+        UnknownNameError: It is of another kind.
+    """
+    kinds = {int(mujoco.mjtGeom.mjGEOM_BOX): "box", int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder"}
+    kind = int(model.geom_type[geom])
+    if kind not in kinds:
+        raise UnknownNameError("kind of drawn geom", str(kind), kinds.values())
+    return kinds[kind]

@@ -1,0 +1,271 @@
+"""The scene: a rover on the ground around it, stepped by MuJoCo, for as far as it drives.
+
+The ground and the rocks follow the rover: when it nears the edge of its patch the model is compiled
+anew around it and the whole state is carried over, so that nothing is felt and memory stays flat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from lpet_sim.errors import PlanningError
+from lpet_sim.geometry import SE3
+from lpet_sim.recording.arrays import Array
+from lpet_sim.recording.truth import CONTACT_NONE, CONTACT_ROCK, CONTACT_SOIL
+from lpet_sim.rover.frames import RoverFrames, rover_frames
+from lpet_sim.rover.ground import Ground, cut_patch
+from lpet_sim.rover.mjcf import WHEELS, compile_on
+from lpet_sim.rover.spec import RoverSpec
+from lpet_sim.rover.wheel_soil import TabulatedSlip, WheelSoilLaw, WheelState
+
+_REACH_M = 1.25  # farthest part of a wheel from the body's origin, with room to spare
+_ROCK_MARGIN_M = 1.0  # rocks are found by their centre; the largest reach this far
+_LIFT_STEP_M = 0.01
+
+
+class Scene:
+    """A rover that stands on a terrain.
+
+    Attributes:
+        ground: The terrain.
+        spec: The rover.
+        frames: Its frames.
+        law: The wheel-soil law, asked at every step.
+        patch_changes: How often the ground has been cut anew.
+    """
+
+    def __init__(self, ground: Ground, spec: RoverSpec, law: WheelSoilLaw) -> None:
+        """Prepare a scene; `build_scene` makes it ready to use."""
+        self.ground = ground
+        self.spec = spec
+        self.frames: RoverFrames = rover_frames(spec)
+        self.law = law
+        self.patch_changes = 0
+        self.step_count = 0
+        self._held = False
+        self._slip = np.zeros(6)
+        self._soil = np.zeros(6, dtype=np.int64)
+
+    @property
+    def xy(self) -> Array:
+        """Position of the body in the world's plane [m], Shape (2,)."""
+        return self._qpos[:2].copy()
+
+    @property
+    def yaw_rad(self) -> float:
+        """Heading of the body in the world [rad]."""
+        w, x, y, z = self._qpos[3:7]
+        return float(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+
+    @property
+    def up(self) -> float:
+        """Cosine of the body's tilt: 1 upright, 0 on its side."""
+        _, x, y, _ = self._qpos[3:7]
+        return float(1 - 2 * (x * x + y * y))
+
+    def place(self, xy: Array, yaw_rad: float) -> None:
+        """Set the rover down at rest, upright on the plane through the ground under its wheels."""
+        self._load_patch(np.asarray(xy, dtype=float), carry=False)
+        R_flat = SE3.from_rpy([0.0, 0.0, yaw_rad], [*xy, 0.0])
+        wheel = R_flat @ self.frames.contact_body_m
+        height = self.ground.height(wheel[:, :2])
+        plane = np.c_[wheel[:, :2] - xy, np.ones(6)]
+        slope_x, slope_y, level = np.linalg.lstsq(plane, height, rcond=None)[0]
+        pose = SE3(_facing(slope_x, slope_y, yaw_rad), np.zeros(3))
+        centre = np.array([*xy, level])
+        self._qpos[:3] = centre + self.frames.ride_height_m * pose.rotation[:, 2]
+        self._qpos[3:7] = pose.quat_wxyz()
+        self._lift_clear()
+        self.refresh_soil()
+
+    def _lift_clear(self) -> None:
+        """Raise the rover until nothing touches, since it may have been put inside a rock."""
+        mujoco.mj_forward(self.model, self.data)
+        while self.data.ncon:
+            self._qpos[2] += _LIFT_STEP_M
+            mujoco.mj_forward(self.model, self.data)
+
+    def command(self, steer_rad: Array, rate_radps: Array) -> None:
+        """Set the steering angles [rad] and wheel rates [rad/s], Shape (6,) each."""
+        self._ctrl[self._steer_act] = steer_rad
+        self._ctrl[self._drive_act] = rate_radps
+
+    def hold(self, held: bool) -> None:
+        """Begin or end a forced slip: the wheels' surfaces stand still while the wheels turn."""
+        self._held = held
+
+    def step(self) -> None:
+        """Advance by one physics step, and set the slip of the next from the traction of this."""
+        mujoco.mj_step(self.model, self.data)
+        self.step_count += 1
+        omega = self._qvel[self._drive_dof]
+        target = np.ones(6) if self._held else self.law.slip(self._wheel_state(omega))
+        self._slip += self._filter_gain * (target - self._slip)
+        self._surfacevel[self._wheel_geom, 5] = -self._slip * omega
+
+    def _wheel_state(self, omega: Array) -> WheelState:
+        """Split the net force on each wheel along its axle, along its rolling, and the rest."""
+        force = self._load_sensor[:, 1:]
+        axle = self._geom_xmat[self._wheel_geom, 2::3]
+        side = np.einsum("ij,ij->i", force, axle)
+        along = -self._qfrc_constraint[self._drive_dof] / self.frames.wheel_radius_m
+        rest = np.einsum("ij,ij->i", force, force) - side * side - along * along
+        load = np.sqrt(np.maximum(rest, 0.0))
+        traction = np.copysign(1.0, omega) * along
+        on_rock = self._load_sensor[:, 0] > self._soil_sensor
+        return WheelState(traction, load, omega, self._soil, on_rock)
+
+    def wheel_state(self) -> WheelState:
+        """Give what the wheel-soil law is told of the wheels now."""
+        return self._wheel_state(self._qvel[self._drive_dof])
+
+    def refresh_soil(self) -> None:
+        """Look up the soil under the wheels."""
+        self._soil = self.ground.soil(self.data.xpos[self._wheel_body, :2])
+
+    def follow(self) -> None:
+        """Cut the ground anew around the rover when it nears the edge of its patch."""
+        away = np.abs(self.xy - self.model.geom("ground").pos[:2]).max()
+        if away > self.spec.patch_m / 2 - _REACH_M:
+            self.recentre()
+
+    def recentre(self) -> None:
+        """Cut the ground anew around the rover, and carry its state over."""
+        self._load_patch(self.xy, carry=True)
+        self.patch_changes += 1
+
+    def _load_patch(self, xy: Array, carry: bool) -> None:
+        patch = cut_patch(self.ground, xy, self.spec.patch_m)
+        box = patch.box(_ROCK_MARGIN_M)
+        rocks = self.ground.rocks(box, self.spec.rock_min_diameter_m)
+        model = compile_on(self.spec.model, self.spec.physics_dt_s, patch, rocks)
+        data = mujoco.MjData(model)
+        if carry:
+            self._carry_over(model, data)
+        self.model, self.data = model, data
+        self._bind()
+
+    def _carry_over(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Copy the state, with what the solver starts from and what the law has just read."""
+        kind = mujoco.mjtState.mjSTATE_INTEGRATION
+        state = np.empty(mujoco.mj_stateSize(self.model, kind))
+        mujoco.mj_getState(self.model, self.data, state, kind)
+        mujoco.mj_setState(model, data, state, kind)
+        for name in ("sensordata", "xpos", "xquat", "qfrc_constraint"):
+            getattr(data, name)[:] = getattr(self.data, name)
+        for wheel in WHEELS:
+            mine = self.model.geom(f"wheel_{wheel}").id
+            theirs = model.geom(f"wheel_{wheel}").id
+            model.geom_surfacevel[theirs] = self.model.geom_surfacevel[mine]
+            data.geom_xmat[theirs] = self.data.geom_xmat[mine]
+
+    def _bind(self) -> None:
+        """Keep views of MuJoCo's arrays: looking them up at every step would cost more."""
+        model, data = self.model, self.data
+        self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._geom_xmat, self._qfrc_constraint = data.geom_xmat, data.qfrc_constraint
+        self._surfacevel = model.geom_surfacevel
+        self._wheel_geom = self._ids("geom", "wheel_")
+        self._wheel_body = self._ids("body", "wheel_")
+        self._leg_body = self._ids("body", "leg_")
+        self._drive_act = self._ids("actuator", "drive_")
+        self._steer_act = self._ids("actuator", "steer_")
+        self._drive_dof = np.array([model.joint(f"drive_{w}").dofadr[0] for w in WHEELS])
+        self._drive_qpos = np.array([model.joint(f"drive_{w}").qposadr[0] for w in WHEELS])
+        self._steer_qpos = np.array([model.joint(f"steer_{w}").qposadr[0] for w in WHEELS])
+        joints = self.frames.suspension_joints
+        self._suspension_qpos = np.array([model.joint(j).qposadr[0] for j in joints])
+        start = model.sensor("load_front_left").adr[0]
+        self._load_sensor = data.sensordata[start : start + 24].reshape(6, 4)
+        start = model.sensor("soil_front_left").adr[0]
+        self._soil_sensor = data.sensordata[start : start + 6]
+        self._filter_gain = -np.expm1(-self.spec.physics_dt_s / self.spec.wheel_soil.filter_s)
+
+    def _ids(self, kind: str, prefix: str) -> NDArray[np.int64]:
+        look_up = getattr(self.model, kind)
+        return np.array([look_up(prefix + wheel).id for wheel in WHEELS])
+
+    def body_row(self) -> Array:
+        """Give position, quaternion, velocity in the world and body rate, Shape (13,)."""
+        return np.concatenate([self._qpos[:7], self._qvel[:6]])
+
+    def wheel_row(self) -> Array:
+        """Give the wheels' and joints' state as one row, for `truth_log`, Shape (72 + j,)."""
+        load = self._wheel_state(self._qvel[self._drive_dof]).load_n
+        return np.concatenate(
+            [
+                self._qpos[self._drive_qpos],
+                self._qpos[self._steer_qpos],
+                load,
+                self._contact_kinds(),
+                self.data.xpos[self._wheel_body].ravel(),
+                self.data.xquat[self._leg_body].ravel(),
+                self._qpos[self._suspension_qpos],
+            ]
+        )
+
+    def _contact_kinds(self) -> NDArray[np.uint8]:
+        found, soil = self._load_sensor[:, 0], self._soil_sensor
+        kind = np.where(found > 0, CONTACT_SOIL, CONTACT_NONE)
+        return np.where(found > soil, CONTACT_ROCK, kind).astype(np.uint8)
+
+
+def _facing(slope_x: float, slope_y: float, yaw_rad: float) -> Array:
+    """Give the rotation with z normal to a plane and x along the heading, Shape (3, 3)."""
+    up = np.array([-slope_x, -slope_y, 1.0])
+    up /= np.linalg.norm(up)
+    ahead = np.array([np.cos(yaw_rad), np.sin(yaw_rad), 0.0])
+    left = np.cross(up, ahead)
+    left /= np.linalg.norm(left)
+    return np.stack([np.cross(left, up), left, up], axis=1)
+
+
+def build_scene(
+    ground: Ground,
+    spec: RoverSpec,
+    start_xy_m: Sequence[float] = (0.0, 0.0),
+    start_yaw_rad: float = 0.0,
+    law: WheelSoilLaw | None = None,
+) -> Scene:
+    """Set a rover down on a terrain.
+
+    Args:
+        ground: The terrain.
+        spec: The rover.
+        start_xy_m: Where, in the world [m].
+        start_yaw_rad: Its heading [rad].
+        law: The wheel-soil law; None for the table of the spec.
+
+    Raises:
+        UnknownNameError: There is no such rover model.
+        PlanningError: The start lies outside the drivable ground.
+    """
+    check_drivable(ground, np.array([start_xy_m], dtype=float))
+    law = law or TabulatedSlip(spec.wheel_soil, ground.spec.soils)
+    scene = Scene(ground, spec, law)
+    scene.place(np.asarray(start_xy_m, dtype=float), start_yaw_rad)
+    return scene
+
+
+def check_drivable(ground: Ground, xy: Array) -> None:
+    """Hold points to lie on drivable ground, with the rover's reach to spare.
+
+    Raises:
+        PlanningError: A point, Shape (n, 2), lies outside.
+    """
+    box = ground.drivable
+    if box is None:
+        return
+    low = np.array([box.x_min, box.y_min]) + _REACH_M
+    high = np.array([box.x_max, box.y_max]) - _REACH_M
+    outside = np.any((xy < low) | (xy > high), axis=1)
+    if outside.any():
+        x, y = xy[outside][0]
+        raise PlanningError(
+            f"({x:.1f}, {y:.1f}) m lies outside the drivable ground: x from {low[0]:.1f} to "
+            f"{high[0]:.1f}, y from {low[1]:.1f} to {high[1]:.1f} m"
+        )

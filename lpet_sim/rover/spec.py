@@ -1,0 +1,116 @@
+"""What a rover and a drive are: frozen specs with units in their names."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from lpet_sim.rover.wheel_soil import TabulatedSlipSpec
+from lpet_sim.spec import Spec
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+MARS_100_M_PER_H_MPS = 100.0 / 3600.0
+
+
+class RoverSpec(Spec):
+    """Which rover, and how finely the ground under it is resolved.
+
+    Masses, lengths and frames are the MJCF's; ``models/README.md`` has their sources.
+
+    Attributes:
+        model: Name of a file in ``models/``, without its ending.
+        physics_dt_s: Physics step; 5 ms holds the slip law to 0.3 points (REFERENCE 4).
+        patch_m: Side of the square of ground that is loaded around the rover.
+        rock_min_diameter_m: Smaller rocks are pressed into the soil and not collided with
+            (assumption: half the wheel's width).
+        steer_rate_radps: Fastest steering (assumption, 6 deg/s).
+        wheel_soil: The law of wheel slip.
+    """
+
+    model: str = "exomars"
+    physics_dt_s: Annotated[float, Field(ge=0.001, le=0.01)] = 0.005
+    patch_m: Annotated[float, Field(ge=4.0, le=32.0)] = 8.0
+    rock_min_diameter_m: Annotated[float, Field(ge=0.02, le=0.5)] = 0.06
+    steer_rate_radps: Annotated[float, Field(gt=0.0, le=1.0)] = math.radians(6.0)
+    wheel_soil: TabulatedSlipSpec = TabulatedSlipSpec()
+
+
+class ForcedSlip(Spec):
+    """Wheels that turn while the rover stays where it is, as in the paper's data sets.
+
+    Attributes:
+        start_s: When it begins, since the start.
+        duration_s: How long it lasts; the paper forces 5 s.
+    """
+
+    start_s: NotNegative
+    duration_s: Positive = 5.0
+
+
+class Stop(Spec):
+    """A halt on the way.
+
+    Attributes:
+        at_m: Distance along the planned path.
+        duration_s: How long the rover stands.
+    """
+
+    at_m: NotNegative
+    duration_s: Positive
+
+
+class DriveSpec(Spec):
+    """A drive along waypoints.
+
+    Attributes:
+        waypoints_m: Corners of the path in the world, (x, y); the first one is the start.
+        speed_mps: Speed of the body, and the most that any wheel's ground speed is asked to be in
+            a point turn; 100 m/h by default (the paper).
+        min_turn_radius_m: Tightest arc of the body's origin; sharper corners are turned on the
+            spot.
+        corner_cut_m: How far a rounded corner may pass from its waypoint.
+        acceleration_mps2: Ramp of the speed (assumption).
+        stops: Halts, in order of distance.
+        forced_slips: Forced slip events, in order of time and apart from each other.
+        settle_s: Standstill before time 0, in which the suspension comes to rest.
+        imu_rate_hz: Rate of the body's truth; must divide the physics rate.
+        wheel_rate_hz: Rate of the wheels' truth; must divide the physics rate.
+        control_rate_hz: Rate of the path follower; must divide the physics rate.
+        time_limit_s: When to give up; None for three times the planned duration.
+    """
+
+    waypoints_m: Annotated[tuple[tuple[float, float], ...], Field(min_length=2)]
+    speed_mps: Annotated[float, Field(gt=0.0, le=0.5)] = MARS_100_M_PER_H_MPS
+    min_turn_radius_m: Annotated[float, Field(ge=1.0)] = 1.5
+    corner_cut_m: Positive = 0.3
+    acceleration_mps2: Positive = 0.02
+    stops: tuple[Stop, ...] = ()
+    forced_slips: tuple[ForcedSlip, ...] = ()
+    settle_s: NotNegative = 5.0
+    imu_rate_hz: Positive = 100.0
+    wheel_rate_hz: Positive = 20.0
+    control_rate_hz: Positive = 10.0
+    time_limit_s: Positive | None = None
+
+    @model_validator(mode="after")
+    def _order(self) -> Self:
+        """Hold waypoints, stops and slips to be distinct and in order."""
+        for i, (a, b) in enumerate(pairwise(self.waypoints_m)):
+            if math.dist(a, b) < 1e-3:
+                raise ValueError(
+                    f"waypoints {i} and {i + 1} coincide; they must be at least 1 mm apart"
+                )
+        at = [stop.at_m for stop in self.stops]
+        if sorted(at) != at:
+            raise ValueError(f"stops at {at} m are out of order; sort them by at_m")
+        for first, then in pairwise(self.forced_slips):
+            if then.start_s < first.start_s + first.duration_s:
+                raise ValueError(
+                    f"forced slip at {then.start_s} s begins before the one at {first.start_s} s has "
+                    "ended; they must follow each other"
+                )
+        return self
