@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from estimators.dead_reckoning import DeadReckoning
+from estimators.fused_odometry import FusedOdometry
 from estimators.protocol import Estimator
 from lpet_sim.errors import UnknownNameError
 
 ESTIMATORS: dict[str, Callable[[], Estimator]] = {
     "dead_reckoning": DeadReckoning,
+    "fused_odometry": FusedOdometry,
 }
 """Every estimator by name, as a builder that takes the default spec."""
 

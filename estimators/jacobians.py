@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from lpet_sim.geometry.compiled import small_exp
 from lpet_sim.recording.arrays import Array
 
 _TERMS = 8
@@ -56,3 +57,21 @@ def step_jacobians(u: Array) -> tuple[Array, Array]:
         F += term
         G += term / (n + 1)
     return F, G
+
+
+@njit(cache=True)
+def se3_exp(xi: Array) -> tuple[Array, Array]:
+    """Map one twist to rotation (3, 3) and translation (3,): ``(exp(phi), J(phi) rho)``.
+
+    ``J = I + (1 - cos x)/x^2 hat(phi) + (x - sin x)/x^3 hat(phi)^2`` with ``x = |phi|``.
+
+    Reference:
+        Barfoot (2017), eq. 7.33 and 7.77.
+    """
+    phi, rho = xi[3:], xi[:3]
+    skew, x = hat(phi), np.sqrt(np.sum(phi * phi))
+    b, c = 0.5 - x * x / 24.0, 1.0 / 6.0 - x * x / 120.0
+    if x > 1e-3:
+        b, c = 2.0 * np.sin(0.5 * x) ** 2 / x**2, (x - np.sin(x)) / x**3
+    first = skew @ rho
+    return small_exp(phi), rho + b * first + c * (skew @ first)

@@ -8,7 +8,7 @@ squares; what is left over is slip.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
@@ -17,7 +17,7 @@ from pydantic import Field
 
 from lpet_sim.errors import RecordingError
 from lpet_sim.geometry import SE3
-from lpet_sim.recording.arrays import Array, ArrayStruct, Ints
+from lpet_sim.recording.arrays import NS_PER_S, Array, ArrayStruct, Ints
 from lpet_sim.recording.calibration import WheelCalibration
 from lpet_sim.recording.streams import Measurements, WheelStream
 from lpet_sim.recording.trajectory import Trajectory
@@ -68,12 +68,14 @@ class OdometryTrack:
         rolled_m: Distance rolled up to each pose [m], Shape (n,).
         variance_per_m: Variance of ``xi`` that each metre adds, Shape (6,).
         scale_sigma: Relative error of each part of ``xi``, 1 sigma, fully correlated, Shape (6,).
+        variance_per_s: Variance of ``xi`` that each second adds, Shape (6,).
     """
 
     trajectory: Trajectory
     rolled_m: Array
     variance_per_m: Array
     scale_sigma: Array
+    variance_per_s: Array = field(default_factory=lambda: np.zeros(6))
 
     def between(self, t_prev_ns: int, t_curr_ns: int) -> tuple[SE3, Array]:
         """Give a step and its covariance.
@@ -92,8 +94,10 @@ class OdometryTrack:
         T_world_body = self.trajectory.at(query)
         T_prev_curr = T_world_body[0].inverse() @ T_world_body[1]
         rolled = np.diff(np.interp(query, self.trajectory.t_ns, self.rolled_m))[0]
+        variance = self.variance_per_m * rolled
+        variance = variance + self.variance_per_s * (t_curr_ns - t_prev_ns) / NS_PER_S
         along = self.scale_sigma * T_prev_curr.log()
-        return T_prev_curr, np.diag(self.variance_per_m * rolled) + np.outer(along, along)
+        return T_prev_curr, np.diag(variance) + np.outer(along, along)
 
 
 def wheel_displacements(wheels: WheelStream, calibration: WheelCalibration) -> Array:

@@ -1,0 +1,246 @@
+"""The compiled loop of the fused odometry: an error-state filter over wheel intervals.
+
+State of the error: ``xi`` 0:6 (right perturbation), gyro bias 6:9, accelerometer bias 9:12 (both
+in the body), scale of the wheels 12.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from estimators import gaussian
+from estimators.jacobians import hat, se3_exp, step_jacobians
+from lpet_sim.geometry.compiled import small_exp, small_log
+from lpet_sim.recording.arrays import Array
+
+SIZE = 13
+_START_SIGMA = 1e-6
+
+
+class Inputs(NamedTuple):
+    """What was measured over each of n wheel intervals, in the body.
+
+    Attributes:
+        dt: Lengths [s], Shape (n,).
+        turns: Rotation by the gyro [rad], Shape (n, 3).
+        speeds: Specific force integrated over time [m/s], Shape (n, 3).
+        moved: Mean displacement of the contact points [m], Shape (n, 2).
+        rolled: Mean distance rolled [m], Shape (n,).
+        rest: Whether the rover stands, Shape (n,).
+    """
+
+    dt: Array
+    turns: Array
+    speeds: Array
+    moved: Array
+    rolled: Array
+    rest: NDArray[np.bool_]
+
+
+class Constants(NamedTuple):
+    """What is declared and stays.
+
+    Attributes:
+        up: Specific force of standstill in the world [m/s^2], Shape (3,).
+        contact: Mean contact point in the body [m], Shape (3,).
+        variance_per_m: Of the wheels' translation [m^2/m], Shape (3,).
+        scale_sigma: Of the wheels, 1 sigma.
+        bias_sigma: Turn-on biases of gyro and accelerometer, Shape (2,).
+        bias_walk: Their random walks, Shape (2,).
+        random_walk: Angle and velocity random walk, Shape (2,).
+        quantum: Of a velocity increment [m/s].
+        rest_block: Longest rest taken as one measurement [s].
+        gate: Chi-square threshold of a rest measurement (6 degrees of freedom).
+    """
+
+    up: Array
+    contact: Array
+    variance_per_m: Array
+    scale_sigma: float
+    bias_sigma: Array
+    bias_walk: Array
+    random_walk: Array
+    quantum: float
+    rest_block: float
+    gate: float
+
+
+@njit(cache=True)
+def turns_between(t_s: Array, edges_s: Array, gyro_radps: Array) -> Array:
+    """Integrate body rates over other intervals than their own.
+
+    A rate that straddles an edge is split in proportion to time.
+
+    Args:
+        t_s: Edges of the wanted intervals [s], Shape (n + 1,).
+        edges_s: Edges of the gyro's intervals [s], Shape (m + 1,).
+        gyro_radps: Mean rate over each, Shape (m, 3).
+
+    Returns:
+        Rotation vectors [rad], Shape (n, 3).
+    """
+    out = np.zeros((len(t_s) - 1, 3))
+    j = 0
+    for k in range(len(out)):
+        R = np.eye(3)
+        while j < len(gyro_radps) and edges_s[j + 1] <= t_s[k]:
+            j += 1
+        i = j
+        while i < len(gyro_radps) and edges_s[i] < t_s[k + 1]:
+            span = min(edges_s[i + 1], t_s[k + 1]) - max(edges_s[i], t_s[k])
+            R = R @ small_exp(gyro_radps[i] * span)
+            i += 1
+        out[k] = small_log(R)
+    return out
+
+
+@njit(cache=True)
+def body_twist(
+    turn: Array, moved: Array, dt: float, bias: Array, scale: float, contact: Array
+) -> Array:
+    """Give the twist of the body over one interval, Shape (6,).
+
+    ``phi = turn - bias dt``; the mean contact point moves by ``(1 + scale) moved`` in the plane of
+    the body, so that the origin moves by ``(1 + scale) moved - phi x contact``.
+    """
+    out = np.empty(6)
+    phi = turn - bias * dt
+    out[3:] = phi
+    out[:3] = hat(contact) @ phi
+    out[:2] += (1.0 + scale) * moved
+    return out
+
+
+@njit(cache=True)
+def twist_jacobians(moved: Array, dt: float, contact: Array) -> tuple[Array, Array]:
+    """Give the derivatives of `body_twist` by the bias, Shape (6, 3), and by the scale, (6,)."""
+    by_turn = np.zeros((6, 3))
+    by_turn[:3] = hat(contact)
+    by_turn[3:] = np.eye(3)
+    by_scale = np.zeros(6)
+    by_scale[:2] = moved
+    return -dt * by_turn, by_scale
+
+
+@njit(cache=True)
+def predict(P: Array, u: Array, moved: Array, rolled: float, dt: float, c: Constants) -> Array:
+    """Carry the covariance over one driven interval."""
+    by_bias, by_scale = twist_jacobians(moved, dt, c.contact)
+    F, cov = np.eye(SIZE), np.zeros((SIZE, SIZE))
+    to_next, by_twist = step_jacobians(u)
+    F[:6, :6] = to_next
+    F[:6, 6:9] = by_twist @ by_bias
+    F[:6, 12] = by_twist @ by_scale
+    cov[:6, :6] = (c.random_walk[0] ** 2 / dt) * (by_bias @ by_bias.T)
+    for i in range(3):
+        cov[i, i] += c.variance_per_m[i] * rolled
+    return gaussian.propagate(P, F, cov + _bias_drift(dt, c))
+
+
+@njit(cache=True)
+def _bias_drift(dt: float, c: Constants) -> Array:
+    cov = np.zeros((SIZE, SIZE))
+    for i in range(3):
+        cov[6 + i, 6 + i] = c.bias_walk[0] ** 2 * dt
+        cov[9 + i, 9 + i] = c.bias_walk[1] ** 2 * dt
+    return cov
+
+
+@njit(cache=True)
+def rest_jacobian(R: Array, up: Array) -> Array:
+    """Give the derivative of (mean rate, mean specific force) at rest by the error, (6, 13).
+
+    The rate is the bias; the force is ``R_true^T up + bias`` and ``R_true^T up = a + hat(a) theta``
+    to first order with ``a = R^T up``.
+    """
+    H = np.zeros((6, SIZE))
+    H[:3, 6:9] = np.eye(3)
+    H[3:, 3:6] = hat(R.T @ up)
+    H[3:, 9:12] = np.eye(3)
+    return H
+
+
+@njit(cache=True)
+def rest_noise(duration: float, c: Constants) -> Array:
+    """Give the covariance of (mean rate, mean force) over a rest, Shape (6, 6).
+
+    ``N^2/T`` each; the velocity is read at both ends with a variance of ``q^2/12``.
+    """
+    cov = np.zeros((6, 6))
+    rounding = c.quantum**2 / 6.0 / duration**2
+    for i in range(3):
+        cov[i, i] = c.random_walk[0] ** 2 / duration
+        cov[3 + i, 3 + i] = c.random_walk[1] ** 2 / duration + rounding
+    return cov
+
+
+@njit(cache=True)
+def run(R: Array, p: Array, data: Inputs, c: Constants) -> tuple[Array, Array, Array, Array]:
+    """Filter a whole traverse.
+
+    Args:
+        R: Attitude of the body at the start, Shape (3, 3).
+        p: Its position [m], Shape (3,).
+        data: What was measured.
+        c: What is declared.
+
+    Returns:
+        Attitudes (n + 1, 3, 3), positions (n + 1, 3), covariances of ``xi`` (n + 1, 6, 6), and 1
+        where a rest measurement was rejected by the gate, Shape (n + 1,).
+    """
+    n = len(data.dt)
+    out_R, out_p, out_P = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3)), np.empty((n + 1, 6, 6))
+    rejected, bias = np.zeros(n + 1), np.zeros(7)
+    P = _start_covariance(c)
+    out_R[0], out_p[0], out_P[0] = R, p, P[:6, :6]
+    held, mean = 0.0, np.zeros(6)
+    for k in range(n):
+        if data.rest[k]:
+            held += data.dt[k]
+            mean[:3] += data.turns[k]
+            mean[3:] += data.speeds[k]
+            P = P + _bias_drift(data.dt[k], c)
+            last = k + 1 == n or not data.rest[k + 1]
+            if last or held >= c.rest_block:
+                R, p, bias, P, rejected[k + 1] = _stand(R, p, bias, P, mean / held, held, c)
+                held, mean = 0.0, np.zeros(6)
+        else:
+            u = body_twist(data.turns[k], data.moved[k], data.dt[k], bias[:3], bias[6], c.contact)
+            P = predict(P, u, data.moved[k], data.rolled[k], data.dt[k], c)
+            R, p = _moved(R, p, u)
+        out_R[k + 1], out_p[k + 1], out_P[k + 1] = R, p, P[:6, :6]
+    return out_R, out_p, out_P, rejected
+
+
+@njit(cache=True)
+def _start_covariance(c: Constants) -> Array:
+    """The start is given: a micrometre and a microradian keep the covariance positive definite."""
+    sigma = np.full(SIZE, _START_SIGMA)
+    sigma[6:9], sigma[9:12], sigma[12] = c.bias_sigma[0], c.bias_sigma[1], c.scale_sigma
+    return np.diag(sigma**2)
+
+
+@njit(cache=True)
+def _moved(R: Array, p: Array, u: Array) -> tuple[Array, Array]:
+    step_R, step_p = se3_exp(u)
+    return R @ step_R, p + R @ step_p
+
+
+@njit(cache=True)
+def _stand(
+    R: Array, p: Array, bias: Array, P: Array, mean: Array, duration: float, c: Constants
+) -> tuple[Array, Array, Array, Array, float]:
+    """Take in a rest; leave everything as it is where the measurement does not fit."""
+    H, cov = rest_jacobian(R, c.up), rest_noise(duration, c)
+    innovation = mean - bias[:6]
+    innovation[3:] -= R.T @ c.up
+    S = gaussian.innovation_covariance(P, H, cov)
+    if gaussian.normalised_square(innovation, S) > c.gate:
+        return R, p, bias, P, 1.0
+    dx, P = gaussian.update(P, H, innovation, cov)
+    R, p = _moved(R, p, dx[:6])
+    return R, p, bias + dx[6:], P, 0.0
