@@ -11,7 +11,7 @@ import rasterio
 from numba import njit
 from numpy.typing import NDArray
 from rasterio.errors import RasterioIOError
-from scipy.ndimage import spline_filter
+from scipy.ndimage import gaussian_filter, spline_filter
 
 from lpet_sim.datasets import data_path
 from lpet_sim.errors import SpecError
@@ -22,6 +22,7 @@ from lpet_sim.terrain.spec import DemSpec, ReliefSpec
 from lpet_sim.terrain.spline import slopes, weights
 
 ORDER = 8.0  # of the crossover between DEM and synthesis, in frequency
+SMOOTH = 0.12  # scale of what goes on with its slope beyond the edge, over the blend. A choice.
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +30,7 @@ class DemGround:
     """A DEM, fine roughness over it, and synthesised relief beyond its edge.
 
     ``z = edge + w (dem - edge) + (1 - w) coarse + fine``: inside the extent w is 1, and it falls
-    to 0 over the blend's width outside, where the DEM is continued by reflection through its edge.
+    to 0 over the blend's width outside, where the DEM is continued by mirror images.
     ``fine`` and ``coarse`` are independent and share the relief's spectrum between them, so that
     far outside the sum is the relief asked for.
 
@@ -130,15 +131,27 @@ def _assemble(
     extent = Box(west, south, west + (nx - 1) * pixel[0], south + (ny - 1) * pixel[1])
     z = elevation[::-1] - (elevation.mean() if spec.datum_m is None else spec.datum_m)
     edge = float(np.concatenate([z[0], z[-1], z[:, 0], z[:, -1]]).mean())
-    pad = [int(np.ceil(spec.blend_m / side)) + 4 for side in pixel]
+    pad = (int(spec.blend_m / pixel[0]) + 5, int(spec.blend_m / pixel[1]) + 5)
     first = (west - pad[0] * pixel[0], south - pad[1] * pixel[1])
-    wide = np.pad(z - edge, ((pad[1],) * 2, (pad[0],) * 2), mode="reflect", reflect_type="odd")
+    wide = _continued(z - edge, pad)
     x = first[0] + np.arange(wide.shape[1]) * pixel[0]
     y = first[1] + np.arange(wide.shape[0]) * pixel[1]
     wide *= _fade(x, extent.x_min, extent.x_max, spec.blend_m)[0]
     wide *= _fade(y, extent.y_min, extent.y_max, spec.blend_m)[0][:, None]
     coefficients = spline_filter(wide, order=3, mode="mirror")
     return DemGround(coefficients, pixel, first, extent, spec.blend_m, edge, fine, coarse)
+
+
+def _continued(z: Array, pad: tuple[int, int]) -> Array:
+    """Continue a grid beyond its edge by so many pixels in x and y.
+
+    What is smooth goes on with its slope, turned about the edge (an odd mirror image); what is
+    fine is mirrored, as turning it would leave streaks across the edge.
+    """
+    width = ((pad[1], pad[1]), (pad[0], pad[0]))
+    smooth = gaussian_filter(np.pad(z, width, "reflect", reflect_type="odd"), SMOOTH * min(pad))
+    inside = smooth[pad[1] : -pad[1], pad[0] : -pad[0]]
+    return smooth + np.pad(z - inside, width, "reflect")
 
 
 def find_dem(path: str) -> Path:

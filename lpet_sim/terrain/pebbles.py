@@ -28,8 +28,8 @@ class PebbleField:
 
     Attributes:
         key: What the places are hashed with.
-        levels: (least diameter [m], greatest [m], side of a tile [m], mean count on a tile, mean
-            of the albedo with the octave over that without it) of each octave of size, Shape (l, 5).
+        levels: (least diameter [m], greatest [m], side of a tile [m], mean count on a tile,
+            mean albedo with the octave over that without) of each octave, Shape (l, 5).
         light: (x, y) towards the sun in the plane, shadow length in radii, contrast, Shape (4,).
     """
 

@@ -199,7 +199,7 @@ class DemSpec(Spec):
     origin_row_px: float | None = None
     datum_m: float | None = None
     resolved_m: Annotated[float, Field(gt=0.2)] = 6.0
-    blend_m: Annotated[float, Field(ge=5.0)] = 60.0
+    blend_m: Annotated[float, Field(ge=5.0)] = 150.0
 
 
 class TerrainSpec(Spec):
