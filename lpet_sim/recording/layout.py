@@ -24,7 +24,12 @@ ROVER = "/world/rover"
 CAMERAS = {"left": "/world/rover/camera", "right": "/world/rover/camera_right"}
 TERRAIN = "/world/terrain"
 PATHS = "/world/paths"
+LANDMARKS = "/world/landmarks"
+EVENT_PLACES = "/world/events"
 SUMMARY = "/summary"
+
+# Which column of (u_left, u_right, v) is the u of an eye.
+EYE_COLUMNS = {"left": 0, "right": 1}
 
 
 def image(eye: str) -> str:

@@ -29,7 +29,7 @@ def read_recording(path: Path | str) -> Recording:
         RecordingError: The file is missing, truncated, or not a recording of this schema.
     """
     store = open_store(path)
-    return Recording(_manifest(store), _measurements(store), _truth(store))
+    return Recording(read_manifest(store), _measurements(store), _truth(store))
 
 
 def read_measurements(path: Path | str) -> Measurements:
@@ -127,8 +127,15 @@ class StoredImages:
         return {**self.__dict__, "_pairs": None, "_next": 0}
 
 
-def _manifest(store: StoreReader) -> Manifest:
+def read_manifest(store: StoreReader) -> Manifest:
+    """Read where a recording comes from."""
     return Manifest(**store.json(layout.MANIFEST))
+
+
+def read_body_truth(store: StoreReader) -> BodyTruth | None:
+    """Read how the body really moved, None where nobody knows."""
+    columns = store.columns(f"{layout.TRUTH_BODY}/**")
+    return put_together(BodyTruth, layout.TRUTH_BODY, columns)
 
 
 def _measurements(store: StoreReader) -> Measurements:

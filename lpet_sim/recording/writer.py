@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
@@ -10,16 +11,22 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from lpet_sim.geometry import SE3
 from lpet_sim.recording import layout
 from lpet_sim.recording.arrays import ArrayStruct, Ints
 from lpet_sim.recording.buffers import ColumnBuffers, ImageBuffer
 from lpet_sim.recording.calibration import Calibration
 from lpet_sim.recording.columns import Column, take_apart
+from lpet_sim.recording.overview import Overview
 from lpet_sim.recording.png import encode_png
+from lpet_sim.recording.publish import publish
 from lpet_sim.recording.recording import Manifest, Recording
+from lpet_sim.recording.scene import DrawnLink, Mesh
+from lpet_sim.recording.sketch import Sketch
 from lpet_sim.recording.store import StoreWriter
 from lpet_sim.recording.streams import ImuStream, SightingStream, WheelStream
 from lpet_sim.recording.truth import Event, Truth
+from lpet_sim.recording.visuals import Pen
 
 
 class RecordingWriter:
@@ -36,6 +43,7 @@ class RecordingWriter:
         manifest: Manifest,
         calibration: Calibration,
         keep_images: int = 1,
+        draw_sightings_every: int | None = None,
     ) -> None:
         """Open the file.
 
@@ -44,11 +52,15 @@ class RecordingWriter:
             manifest: Where the recording comes from.
             calibration: What is declared of the sensors.
             keep_images: 1 keeps all image pairs, n every n-th, 0 none.
+            draw_sightings_every: Of how many image pairs one has its sightings drawn; as
+                ``keep_images`` says where None, and one of ten where no images are kept. All
+                sightings are stored in any case.
 
         Raises:
             OutputError: The folder cannot be written.
         """
         self._store = StoreWriter(Path(path))
+        self._manifest = manifest
         self._keep_images = keep_images
         self._images_seen = 0
         self._events: list[Event] = []
@@ -57,6 +69,9 @@ class RecordingWriter:
         self._images = ImageBuffer(self._send_images)
         self._store.send_json(layout.MANIFEST, asdict(manifest))
         self._store.send_json(layout.CALIBRATION, calibration.to_mapping())
+        every = draw_sightings_every or keep_images or 10
+        self._sketch = Sketch(Pen(self._store.stream), calibration, every, Overview())
+        self._sketch.cameras()
 
     def __enter__(self) -> Self:
         return self
@@ -81,8 +96,10 @@ class RecordingWriter:
         """Add a piece of the truth."""
         self._has_truth = True
         self._log(layout.TRUTH_BODY, truth.body)
+        self._sketch.body(truth.body)
         if truth.wheels is not None:
             self._log(layout.TRUTH_WHEELS, truth.wheels)
+            self._sketch.wheels(truth.wheels)
         self._events.extend(truth.events)
 
     def log_imu(self, imu: ImuStream) -> None:
@@ -96,6 +113,7 @@ class RecordingWriter:
     def log_sightings(self, sightings: SightingStream) -> None:
         """Add the sightings of some image pairs."""
         self._log(layout.SIGHTINGS, sightings)
+        self._sketch.sightings(sightings)
 
     def log_images(self, t_ns: int, left: NDArray[Any], right: NDArray[Any]) -> bool:
         """Add an image pair, or pass over it as ``keep_images`` says.
@@ -117,8 +135,26 @@ class RecordingWriter:
         if kept:
             times, indices = np.array([t_ns], np.int64), np.array([index], np.int64)
             self._columns.add(layout.IMAGE_INDEX, Column(times, indices))
+            self._sketch.image(times)
             self._images.add(int(t_ns), encode_png(left), encode_png(right))
         return kept
+
+    def draw_mesh(self, name: str, mesh: Mesh) -> None:
+        """Draw a part of the ground or its rocks; another mesh of the same name replaces it."""
+        self._sketch.mesh(name, mesh)
+
+    def draw_rover(self, links: Sequence[DrawnLink]) -> None:
+        """Draw the parts of the rover, parents before what hangs on them."""
+        self._sketch.links(links)
+
+    def draw_motion(self, t_ns: Ints, motions: Mapping[str, SE3]) -> None:
+        """Move parts of the rover; the body itself moves with the truth.
+
+        Args:
+            t_ns: Times [ns], Shape (n,); rows are thinned to five a second.
+            motions: ``T_parent_link`` by the part's name, Shape (n,) each.
+        """
+        self._sketch.motion(t_ns, motions)
 
     def _log(self, prefix: str, struct: ArrayStruct) -> None:
         for name, column in take_apart(struct):
@@ -134,6 +170,8 @@ class RecordingWriter:
         self._images.flush()
         if self._has_truth:
             self._store.send_json(layout.EVENTS, [asdict(event) for event in self._events])
+        self._sketch.finish(self._events)
+        publish(self._store, self._sketch.overview, self._manifest)
         self._store.commit()
 
 

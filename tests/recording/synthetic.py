@@ -122,7 +122,7 @@ def image_times(duration_s: float, rate_hz: float = 2.0) -> np.ndarray:
 def sightings(
     duration_s: float = 20.0, seed: int = 0, width: int = 64, height: int = 48
 ) -> SightingStream:
-    """Make drifting sightings; the third image and the last see nothing."""
+    """Make drifting sightings; the third image and the last but one see nothing."""
     rng = stream(seed, "synthetic", "sightings")
     t_ns = image_times(duration_s)
     home = rng.uniform([0, 0], [width, height], (400, 2))
@@ -131,7 +131,7 @@ def sightings(
     for i in range(len(t_ns)):
         uv = home + velocity * np.arange(i, i - 400, -1)[:, None] % 12
         seen = np.flatnonzero(rng.random(400) < 0.1)
-        seen = seen[:0] if i in (2, len(t_ns) - 1) else seen
+        seen = seen[:0] if i in (2, len(t_ns) - 2) else seen
         ids.append(seen)
         disparity = rng.uniform(1, 10, len(seen))
         rows.append(np.stack([uv[seen, 0], uv[seen, 0] - disparity, uv[seen, 1]], -1))

@@ -1,0 +1,176 @@
+"""The picture of a traverse, drawn while it is recorded, in bounded memory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from lpet_sim.geometry import SE3
+from lpet_sim.recording import layout
+from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
+from lpet_sim.recording.calibration import Calibration
+from lpet_sim.recording.cloud import LandmarkCloud
+from lpet_sim.recording.overview import Overview
+from lpet_sim.recording.scene import DrawnLink, Mesh
+from lpet_sim.recording.streams import SightingStream
+from lpet_sim.recording.tracks import Tails, TrackTails, colours, images_of
+from lpet_sim.recording.truth import BodyTruth, Event, WheelTruth
+from lpet_sim.recording.visuals import EVENT_COLOUR, TRUTH_COLOUR, Pen
+
+MOTION_PERIOD_NS = NS_PER_S // 5
+
+
+class Thinner:
+    """Keeps the first row of each period, over any number of pieces."""
+
+    def __init__(self, period_ns: int = MOTION_PERIOD_NS) -> None:
+        """Start without a past."""
+        self._period_ns = period_ns
+        self._last = -(2**62)
+
+    def keep(self, t_ns: Ints) -> Ints:
+        """Give the indices of the rows to keep."""
+        periods = np.asarray(t_ns) // self._period_ns
+        kept = np.flatnonzero(np.diff(periods, prepend=self._last) > 0)
+        if len(periods):
+            self._last = int(periods[-1])
+        return kept
+
+
+class Sketch:
+    """Draws the pieces of a traverse as they come, and the whole at the end."""
+
+    def __init__(
+        self, pen: Pen, calibration: Calibration, draw_every: int, overview: Overview
+    ) -> None:
+        """Start where the facts stand.
+
+        Args:
+            pen: What draws.
+            calibration: What is declared of the sensors.
+            draw_every: Of how many images one has its sightings drawn.
+            overview: What is known of the traverse already.
+        """
+        self._pen = pen
+        self._stereo = calibration.stereo
+        self._wheels = calibration.wheels.names if calibration.wheels is not None else ()
+        self._draw_every = draw_every
+        self._images_seen = 0
+        self._tails = TrackTails()
+        self._cloud = LandmarkCloud()
+        self._thinners: dict[str, Thinner] = {}
+        self._links = {"": layout.ROVER}
+        self.overview = overview
+
+    def cameras(self) -> None:
+        """Draw the declared camera pair."""
+        if self._stereo is not None:
+            self._pen.cameras(self._stereo)
+            self.overview = replace(self.overview, has_cameras=True)
+
+    def body(self, body: BodyTruth) -> None:
+        """Move the rover along a piece of the truth."""
+        if len(body):
+            self.overview = replace(self.overview, has_truth=True).lasting(body.t_ns)
+            self.motion(body.t_ns, {"": body.T_world_body})
+            self.poses(body.t_ns, body.T_world_body)
+
+    def poses(self, t_ns: Ints, T_world_body: SE3) -> None:
+        """Remember where the rover was."""
+        kept = self._thinners.setdefault("path", Thinner()).keep(t_ns)
+        self._cloud.add_poses(t_ns[kept], T_world_body[kept])
+        self.overview = self.overview.covering(T_world_body.translation)
+
+    def wheels(self, wheels: WheelTruth) -> None:
+        """Name the curves of the wheels; the curves are the exact streams themselves."""
+        if not self.overview.has_wheel_truth:
+            count = wheels.slip.shape[1]
+            names = self._wheels if len(self._wheels) == count else [f"{i}" for i in range(count)]
+            for quantity in ("slip", "load_n"):
+                self._pen.wheel_curve_style(f"{layout.TRUTH_WHEELS}/{quantity}", names)
+            self.overview = replace(self.overview, has_wheel_truth=True)
+
+    def links(self, links: Sequence[DrawnLink]) -> None:
+        """Draw the parts of the rover, parents before what hangs on them."""
+        for link in links:
+            entity = f"{self._links[link.parent]}/{layout.slug(link.name)}"
+            self._links[link.name] = entity
+            self._pen.pose(entity, link.T_parent_link)
+            self._pen.mesh(f"{entity}/mesh", link.mesh)
+
+    def motion(self, t_ns: Ints, motions: Mapping[str, SE3]) -> None:
+        """Move parts of the rover in their parents, thinned to `MOTION_PERIOD_NS`."""
+        for name, poses in motions.items():
+            kept = self._thinners.setdefault(f"link {name}", Thinner()).keep(t_ns)
+            if len(kept):
+                self._pen.poses(self._links[name], t_ns[kept], poses[kept])
+                self.overview = replace(self.overview, has_rover=True)
+
+    def mesh(self, name: str, mesh: Mesh) -> None:
+        """Draw a part of the ground."""
+        self._pen.mesh(f"{layout.TERRAIN}/{layout.slug(name)}", mesh)
+
+    def image(self, t_ns: Ints) -> None:
+        """Count an image pair that is kept, with its time, Shape (1,)."""
+        self.overview = replace(self.overview, images=self.overview.images + 1).lasting(t_ns)
+
+    def sightings(self, sightings: SightingStream) -> None:
+        """Draw sightings and the tails of their tracks on both images."""
+        times, drawn, tails = [], [], []
+        for t_ns, ids, px in images_of(sightings):
+            tail = self._tails.add(ids, px)
+            if self._stereo is not None:
+                self._cloud.add_sightings(t_ns, ids, px, self._stereo)
+            if self._images_seen % self._draw_every == 0:
+                times.append(t_ns)
+                drawn.append((ids, px))
+                tails.append(tail)
+            self._images_seen += 1
+        seen = self.overview.sightings + len(sightings.landmark_id)
+        self.overview = replace(self.overview, sightings=seen)
+        if times:
+            self._draw_points(np.array(times), drawn)
+            self._draw_tails(np.array(times), tails)
+
+    def finish(self, events: Sequence[Event]) -> None:
+        """Draw what is known at the end only: whole paths, landmarks, where events happened."""
+        path = self._cloud.path()
+        if self.overview.has_truth and len(path):
+            length = float(np.linalg.norm(np.diff(path, axis=0), axis=-1).sum())
+            self.overview = replace(self.overview, distance_m=length)
+            self._pen.path(f"{layout.PATHS}/true", path, TRUTH_COLOUR, 3.0)
+        self.landmarks()
+        if events:
+            self._pen.events(events)
+            self.overview = replace(self.overview, has_events=True)
+            self._mark(events)
+
+    def landmarks(self) -> None:
+        """Draw the landmarks that were placed."""
+        ids, p_world = self._cloud.landmarks()
+        if len(ids):
+            self._pen.cloud(layout.LANDMARKS, p_world, colours(ids))
+
+    def _mark(self, events: Sequence[Event]) -> None:
+        places = self._cloud.places(np.array([event.t_ns for event in events]))
+        texts = [event.kind.replace("_", " ") for event in events]
+        self._pen.labels(layout.EVENT_PLACES, places, texts, EVENT_COLOUR)
+
+    def _draw_points(self, t_ns: Ints, drawn: list[tuple[Ints, Array]]) -> None:
+        counts = np.array([len(ids) for ids, _ in drawn])
+        rgba = colours(np.concatenate([ids for ids, _ in drawn]))
+        px = np.concatenate([px for _, px in drawn])
+        for eye, column in layout.EYE_COLUMNS.items():
+            entity = f"{layout.CAMERAS[eye]}/sightings"
+            self._pen.points_2d(entity, t_ns, px[:, [column, 2]], counts, rgba)
+
+    def _draw_tails(self, t_ns: Ints, tails: list[Tails]) -> None:
+        counts = np.array([len(tail.lengths) for tail in tails])
+        lengths = np.concatenate([tail.lengths for tail in tails])
+        rgba = colours(np.concatenate([tail.landmark_id for tail in tails]))
+        px = np.concatenate([tail.points_px for tail in tails])
+        for eye, column in layout.EYE_COLUMNS.items():
+            entity = f"{layout.CAMERAS[eye]}/tracks"
+            self._pen.strips_2d(entity, t_ns, px[:, [column, 2]], lengths, counts, rgba)
