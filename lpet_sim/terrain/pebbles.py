@@ -38,7 +38,7 @@ class PebbleField:
     light: Array
 
     def apply(self, xy: Array, texel_m: float, relative: Array) -> None:
-        """Draw the pebbles of at least two texels over a relative albedo, in place.
+        """Draw the octaves that reach two texels of size over a relative albedo, in place.
 
         Args:
             xy: Points in the world [m], Shape (n, 2).
@@ -46,7 +46,7 @@ class PebbleField:
             relative: Albedo over the mean, Shape (n,).
         """
         for number, level in enumerate(self.levels):
-            if level[0] >= 2.0 * texel_m:
+            if level[1] >= 2.0 * texel_m:
                 _draw_level(xy, self.key, number, level, self.light, texel_m, relative)
                 relative /= level[4]
 
