@@ -67,8 +67,9 @@ def _map(overview: Overview) -> rrb.View:
 
 def _chase(overview: Overview) -> rrb.View:
     start = np.array(overview.low_m or (0.0, 0.0, 0.0))
+    position = start + np.array([-4.0, -4.0, 3.0])
     eye = rrb.EyeControls3D(
-        position=start + (-4.0, -4.0, 3.0), look_target=start, tracking_entity=layout.ROVER
+        position=position, look_target=start, tracking_entity=layout.ROVER, eye_up=_UP
     )
     return _spatial("With the rover", eye)
 

@@ -51,8 +51,13 @@ class ColumnBuffers:
         """Add rows to an entity.
 
         Raises:
-            RecordingError: The rows do not follow those before.
+            RecordingError: The rows do not follow those before, or are not one for each time.
         """
+        if column.offsets is None and len(column.values) != len(column.t_ns):
+            raise RecordingError(
+                f"{entity} has {len(column.values)} rows for {len(column.t_ns)} times: "
+                "they must be equal"
+            )
         pending = self._pending.setdefault(entity, _Pending())
         if len(column.t_ns) and column.t_ns[0] <= pending.last_t_ns:
             raise RecordingError(

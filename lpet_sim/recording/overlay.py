@@ -68,21 +68,21 @@ def add_estimate(
         RecordingError: The file is missing, truncated, or not a recording of this schema.
         OutputError: The result cannot be written.
     """
-    slug = layout.slug(estimate.name)
-    replaced = [f"{root}/{slug}/**" for root in (layout.ESTIMATES, layout.ERRORS, layout.PATHS)]
+    add_estimates(path, [(estimate, errors)], path_out)
+
+
+def add_estimates(
+    path: Path | str,
+    estimates: Sequence[tuple[Estimate, ErrorsOverTime | None]],
+    path_out: Path | str | None = None,
+) -> None:
+    """Overlay several estimates at once, each with its errors or None, as `add_estimate` does."""
+    slugs = [layout.slug(estimate.name) for estimate, _ in estimates]
+    roots = (layout.ESTIMATES, layout.ERRORS, layout.PATHS)
+    replaced = [f"{root}/{slug}/**" for root in roots for slug in slugs]
     with _rewriting(path, path_out, replaced) as copy:
-        _store_estimate(copy, f"{layout.ESTIMATES}/{slug}", estimate)
-        colour = copy.overview.colour_for(estimate.name)
-        names = tuple(estimate.diagnostics)
-        facts = estimate_facts(estimate.name, slug, colour, names, errors)
-        places = estimate.trajectory.T_world_body.translation
-        overview = copy.overview.with_estimate(facts).covering(places)
-        copy.overview = overview.lasting(estimate.trajectory.t_ns)
-        _draw_estimate(copy.pen, estimate, facts, overview.extent_m)
-        if errors is not None:
-            _draw_errors(copy.pen, facts, errors)
-        if not copy.overview.has_rover:
-            copy.pen.poses(layout.ROVER, estimate.trajectory.t_ns, estimate.trajectory.T_world_body)
+        for estimate, errors in estimates:
+            _overlay(copy, estimate, errors)
 
 
 _SIGHTING_ENTITIES = [
@@ -136,6 +136,21 @@ def _draw_sightings(copy: _Copy, sightings: SightingStream) -> Overview:
     sketch.sightings(sightings)
     sketch.landmarks()
     return sketch.overview
+
+
+def _overlay(copy: _Copy, estimate: Estimate, errors: ErrorsOverTime | None) -> None:
+    slug = layout.slug(estimate.name)
+    _store_estimate(copy, f"{layout.ESTIMATES}/{slug}", estimate)
+    colour = copy.overview.colour_for(estimate.name)
+    names = tuple(estimate.diagnostics)
+    facts = estimate_facts(estimate.name, slug, colour, names, errors)
+    _draw_estimate(copy.pen, estimate, facts)
+    if errors is not None:
+        _draw_errors(copy, facts, errors)
+    places = estimate.trajectory.T_world_body.translation
+    copy.overview = copy.overview.with_estimate(facts).covering(places)
+    if not copy.overview.has_rover:
+        copy.pen.poses(layout.ROVER, estimate.trajectory.t_ns, estimate.trajectory.T_world_body)
 
 
 def _store_estimate(copy: _Copy, prefix: str, estimate: Estimate) -> None:
