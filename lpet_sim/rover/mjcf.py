@@ -16,6 +16,7 @@ from lpet_sim.rover.ground import CELL_M, RANGE_M, GroundPatch, RocksLike
 
 WHEELS = ("front_left", "front_right", "middle_left", "middle_right", "rear_left", "rear_right")
 _FLOOR_M = 1.0
+_NET_FORCE = 3  # the contact sensor's reduction of that name
 
 
 def models_folder() -> Path:
@@ -68,18 +69,28 @@ def compile_on(name: str, dt_s: float, patch: GroundPatch, rocks: RocksLike) -> 
     for k in range(len(rocks.id)):
         _add_rock(spec, rocks, k)
     for wheel in WHEELS:
-        spec.add_sensor(
-            name=f"soil_{wheel}",
-            type=mujoco.mjtSensor.mjSENS_CONTACT,
-            objtype=mujoco.mjtObj.mjOBJ_GEOM,
-            objname=f"wheel_{wheel}",
-            reftype=mujoco.mjtObj.mjOBJ_GEOM,
-            refname="ground",
-            intprm=[1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1],
-        )
+        _add_contact_sensor(spec, f"load_{wheel}", wheel, None)
+        _add_contact_sensor(spec, f"soil_{wheel}", wheel, "ground")
     model = spec.compile()
     model.hfield_data[:] = patch.data.ravel()
     return model
+
+
+def _add_contact_sensor(spec: mujoco.MjSpec, name: str, wheel: str, ground: str | None) -> None:
+    """Count a wheel's contacts: all of them, with their net force, or those with one geom."""
+    fields = [mujoco.mjtConDataField.mjCONDATA_FOUND]
+    if ground is None:
+        fields.append(mujoco.mjtConDataField.mjCONDATA_FORCE)
+    sensor = spec.add_sensor(
+        name=name,
+        type=mujoco.mjtSensor.mjSENS_CONTACT,
+        objtype=mujoco.mjtObj.mjOBJ_GEOM,
+        objname=f"wheel_{wheel}",
+        intprm=[sum(1 << int(field) for field in fields), _NET_FORCE if ground is None else 0, 1],
+    )
+    if ground is not None:
+        sensor.reftype = mujoco.mjtObj.mjOBJ_GEOM
+        sensor.refname = ground
 
 
 def _add_ground(spec: mujoco.MjSpec, patch: GroundPatch) -> None:

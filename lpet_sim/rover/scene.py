@@ -20,11 +20,13 @@ from lpet_sim.rover.frames import RoverFrames, rover_frames
 from lpet_sim.rover.ground import Ground, cut_patch
 from lpet_sim.rover.mjcf import WHEELS, compile_on
 from lpet_sim.rover.spec import RoverSpec
+from lpet_sim.rover.wheel_forces import split_forces, turn_surfaces_back
 from lpet_sim.rover.wheel_soil import TabulatedSlip, WheelSoilLaw, WheelState
 
 _REACH_M = 1.25  # farthest part of a wheel from the body's origin, with room to spare
 _ROCK_MARGIN_M = 1.0  # rocks are found by their centre; the largest reach this far
 _LIFT_STEP_M = 0.01
+_HELD = np.ones(6)  # slip of wheels that turn and do not move
 
 
 class Scene:
@@ -90,7 +92,13 @@ class Scene:
             mujoco.mj_forward(self.model, self.data)
 
     def command(self, steer_rad: Array, rate_radps: Array) -> None:
-        """Set the steering angles [rad] and wheel rates [rad/s], Shape (6,) each."""
+        """Set the steering angles [rad] and wheel rates [rad/s], Shape (6,) each.
+
+        The drives integrate their rate to an angle, which lets them brake without creep. A wheel
+        that stalls must not save up a turn for later: the angle is kept within the motor's reach.
+        """
+        angle = self._qpos[self._drive_qpos]
+        self._act[:] = np.clip(self._act, angle - self._drive_reach, angle + self._drive_reach)
         self._ctrl[self._steer_act] = steer_rad
         self._ctrl[self._drive_act] = rate_radps
 
@@ -102,26 +110,29 @@ class Scene:
         """Advance by one physics step, and set the slip of the next from the traction of this."""
         mujoco.mj_step(self.model, self.data)
         self.step_count += 1
-        omega = self._qvel[self._drive_dof]
-        target = np.ones(6) if self._held else self.law.slip(self._wheel_state(omega))
-        self._slip += self._filter_gain * (target - self._slip)
-        self._surfacevel[self._wheel_geom, 5] = -self._slip * omega
-
-    def _wheel_state(self, omega: Array) -> WheelState:
-        """Split the net force on each wheel along its axle, along its rolling, and the rest."""
-        force = self._load_sensor[:, 1:]
-        axle = self._geom_xmat[self._wheel_geom, 2::3]
-        side = np.einsum("ij,ij->i", force, axle)
-        along = -self._qfrc_constraint[self._drive_dof] / self.frames.wheel_radius_m
-        rest = np.einsum("ij,ij->i", force, force) - side * side - along * along
-        load = np.sqrt(np.maximum(rest, 0.0))
-        traction = np.copysign(1.0, omega) * along
-        on_rock = self._load_sensor[:, 0] > self._soil_sensor
-        return WheelState(traction, load, omega, self._soil, on_rock)
+        wheels = self.wheel_state()
+        target = _HELD if self._held else self.law.slip(wheels)
+        turn_surfaces_back(
+            self._surfacevel,
+            self._wheel_geom,
+            self._slip,
+            target,
+            self._filter_gain,
+            wheels.omega_radps,
+        )
 
     def wheel_state(self) -> WheelState:
         """Give what the wheel-soil law is told of the wheels now."""
-        return self._wheel_state(self._qvel[self._drive_dof])
+        traction, load, omega, on_rock = split_forces(
+            self._contacts,
+            self._geom_xmat,
+            self._wheel_geom,
+            self._qfrc_constraint,
+            self._drive_dof,
+            self._qvel,
+            self.frames.wheel_radius_m,
+        )
+        return WheelState(traction, load, omega, self._soil, on_rock)
 
     def refresh_soil(self) -> None:
         """Look up the soil under the wheels."""
@@ -166,7 +177,7 @@ class Scene:
     def _bind(self) -> None:
         """Keep views of MuJoCo's arrays: looking them up at every step would cost more."""
         model, data = self.model, self.data
-        self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._qpos, self._qvel, self._ctrl, self._act = data.qpos, data.qvel, data.ctrl, data.act
         self._geom_xmat, self._qfrc_constraint = data.geom_xmat, data.qfrc_constraint
         self._surfacevel = model.geom_surfacevel
         self._wheel_geom = self._ids("geom", "wheel_")
@@ -174,15 +185,15 @@ class Scene:
         self._leg_body = self._ids("body", "leg_")
         self._drive_act = self._ids("actuator", "drive_")
         self._steer_act = self._ids("actuator", "steer_")
+        limit = model.actuator_forcerange[self._drive_act, 1]
+        self._drive_reach = limit / model.actuator_gainprm[self._drive_act, 0]
         self._drive_dof = np.array([model.joint(f"drive_{w}").dofadr[0] for w in WHEELS])
         self._drive_qpos = np.array([model.joint(f"drive_{w}").qposadr[0] for w in WHEELS])
         self._steer_qpos = np.array([model.joint(f"steer_{w}").qposadr[0] for w in WHEELS])
         joints = self.frames.suspension_joints
         self._suspension_qpos = np.array([model.joint(j).qposadr[0] for j in joints])
         start = model.sensor("load_front_left").adr[0]
-        self._load_sensor = data.sensordata[start : start + 24].reshape(6, 4)
-        start = model.sensor("soil_front_left").adr[0]
-        self._soil_sensor = data.sensordata[start : start + 6]
+        self._contacts = data.sensordata[start : start + 30].reshape(6, 5)
         self._filter_gain = -np.expm1(-self.spec.physics_dt_s / self.spec.wheel_soil.filter_s)
 
     def _ids(self, kind: str, prefix: str) -> NDArray[np.int64]:
@@ -195,7 +206,7 @@ class Scene:
 
     def wheel_row(self) -> Array:
         """Give the wheels' and joints' state as one row, for `truth_log`, Shape (72 + j,)."""
-        load = self._wheel_state(self._qvel[self._drive_dof]).load_n
+        load = self.wheel_state().load_n
         return np.concatenate(
             [
                 self._qpos[self._drive_qpos],
@@ -209,7 +220,7 @@ class Scene:
         )
 
     def _contact_kinds(self) -> NDArray[np.uint8]:
-        found, soil = self._load_sensor[:, 0], self._soil_sensor
+        found, soil = self._contacts[:, 0], self._contacts[:, 4]
         kind = np.where(found > 0, CONTACT_SOIL, CONTACT_NONE)
         return np.where(found > soil, CONTACT_ROCK, kind).astype(np.uint8)
 

@@ -110,7 +110,7 @@ class DriveSpec(Spec):
         for first, then in pairwise(self.forced_slips):
             if then.start_s < first.start_s + first.duration_s:
                 raise ValueError(
-                    f"forced slip at {then.start_s} s begins before the one at {first.start_s} s has "
-                    "ended; they must follow each other"
+                    f"forced slip at {then.start_s} s begins before the one at {first.start_s} s "
+                    "has ended; they must follow each other"
                 )
         return self

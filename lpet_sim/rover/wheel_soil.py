@@ -7,11 +7,13 @@ transfer. Another law needs only a class with the method of `WheelSoilLaw`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Protocol, Self
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
@@ -107,8 +109,15 @@ class TabulatedSlip:
 
     def slip(self, wheels: WheelState) -> Array:
         """Give the slip of each wheel, Shape (6,)."""
-        ratio = wheels.traction_n / np.maximum(wheels.load_n, _MIN_LOAD_N)
-        at_rest = self._slip[0]
-        rise = np.interp(np.abs(ratio), self._ratio, self._slip) - at_rest
-        slip = at_rest + np.copysign(rise, ratio)
-        return slip * np.where(wheels.on_rock, self._rock_factor, self._factor[wheels.soil])
+        factor = np.where(wheels.on_rock, self._rock_factor, self._factor[wheels.soil])
+        return _look_up(wheels.traction_n, wheels.load_n, factor, self._ratio, self._slip)
+
+
+@njit(cache=True)
+def _look_up(traction_n: Array, load_n: Array, factor: Array, ratio: Array, slip: Array) -> Array:
+    out = np.empty(len(factor))
+    for i in range(len(factor)):
+        x = traction_n[i] / max(load_n[i], _MIN_LOAD_N)
+        rise = np.interp(abs(x), ratio, slip) - slip[0]
+        out[i] = factor[i] * (slip[0] + math.copysign(rise, x))
+    return out
