@@ -12,7 +12,6 @@ from lpet_sim.recording.overview import Overview
 
 _SKY = (38, 32, 30, 255)
 _UP = (0.0, 0.0, 1.0)
-_STILL = rrb.EntityBehavior(interactive=False)
 _BACKDROP = (layout.TERRAIN, layout.LANDMARKS, layout.PATHS)
 _COUNTS = ("inliers", "matches", "bridged")
 
@@ -85,16 +84,19 @@ def _view_3d(name: str, overview: Overview, direction: Vector, up: Vector) -> rr
 
 
 def _spatial(name: str, eye: rrb.EyeControls3D | None) -> rrb.View:
-    # What would cover the view with its numbers wherever the pointer rests takes no pointer.
-    still: dict[str, Any] = dict.fromkeys(_BACKDROP, _STILL)
     return rrb.Spatial3DView(
         origin="/world",
         name=name,
         background=_SKY,
         line_grid=False,
         eye_controls=eye,
-        overrides=still,
+        overrides=_still(),
     )
+
+
+def _still() -> dict[Any, Any]:
+    """Let the backdrop take no pointer, which would cover the view with its numbers."""
+    return dict.fromkeys(_BACKDROP, rrb.EntityBehavior(interactive=False))
 
 
 def _eye(eye: str, name: str) -> rrb.View:

@@ -144,13 +144,14 @@ def _overlay(copy: _Copy, estimate: Estimate, errors: ErrorsOverTime | None) -> 
     colour = copy.overview.colour_for(estimate.name)
     names = tuple(estimate.diagnostics)
     facts = estimate_facts(estimate.name, slug, colour, names, errors)
-    _draw_estimate(copy.pen, estimate, facts)
+    trajectory = estimate.trajectory
+    overview = copy.overview.with_estimate(facts).covering(trajectory.T_world_body.translation)
+    copy.overview = replace(overview.lasting(trajectory.t_ns), has_rover=True)
+    if not overview.has_rover:
+        copy.pen.poses(layout.ROVER, trajectory.t_ns, trajectory.T_world_body)
+    _draw_estimate(copy.pen, estimate, facts, overview.extent_m)
     if errors is not None:
-        _draw_errors(copy, facts, errors)
-    places = estimate.trajectory.T_world_body.translation
-    copy.overview = copy.overview.with_estimate(facts).covering(places)
-    if not copy.overview.has_rover:
-        copy.pen.poses(layout.ROVER, estimate.trajectory.t_ns, estimate.trajectory.T_world_body)
+        _draw_errors(copy.pen, facts, errors)
 
 
 def _store_estimate(copy: _Copy, prefix: str, estimate: Estimate) -> None:
