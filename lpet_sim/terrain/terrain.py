@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -32,6 +33,31 @@ class Layer(Protocol):
         ...
 
 
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The sum of the layers.
+
+    Attributes:
+        layers: What adds to the height, in the order of the sum.
+    """
+
+    layers: tuple[Layer, ...]
+
+    def height(self, xy: Array, detail_m: float = 0.0) -> Array:
+        """Give heights at points [m], Shape (n, 2) -> (n,), without what is finer than detail."""
+        total = np.zeros(len(xy))
+        for layer in self.layers:
+            total += layer.height(xy, detail_m)
+        return total
+
+    def gradient(self, xy: Array) -> Array:
+        """Give (dz/dx, dz/dy) at points [m], Shape (n, 2) -> (n, 2)."""
+        total = np.zeros((len(xy), 2))
+        for layer in self.layers:
+            total += layer.gradient(xy)
+        return total
+
+
 class Terrain:
     """Ground, soils, albedo and rocks as pure functions of the plane.
 
@@ -45,12 +71,12 @@ class Terrain:
 
     def __init__(self, spec: TerrainSpec, seed: int) -> None:
         self.spec = spec
-        ground = _build_ground(spec, seed)
-        self.drivable = ground.extent if isinstance(ground, DemGround) else None
-        self._layers: list[Layer] = [ground, *_build_features(spec, seed)]
+        base = _build_base(spec, seed)
+        self.drivable = base.extent if isinstance(base, DemGround) else None
+        self._ground = Ground((base, *_build_features(spec, seed)))
         self._soils = build_soil(spec, stream(seed, "terrain", "soil"))
         self._albedo = build_albedo(spec, seed, self._soils)
-        self._rocks = RockField(spec.rocks, seed, self.height)
+        self._rocks = RockField(spec.rocks, seed, self._ground.height)
 
     def height(self, xy: Array, detail_m: float = 0.0) -> Array:
         """Give the height of the ground without rocks.
@@ -62,11 +88,7 @@ class Terrain:
         Returns:
             Heights [m], Shape (n,); each depends on its own point alone.
         """
-        points = _points(xy)
-        total = np.zeros(len(points))
-        for layer in self._layers:
-            total += layer.height(points, detail_m)
-        return total
+        return self._ground.height(_points(xy), detail_m)
 
     def normal(self, xy: Array) -> Array:
         """Give the unit normals of the ground, upwards, from the analytic gradient.
@@ -77,11 +99,8 @@ class Terrain:
         Returns:
             ``(-dz/dx, -dz/dy, 1)`` scaled to length 1, Shape (n, 3).
         """
-        points = _points(xy)
-        normal = np.zeros((len(points), 3))
-        normal[:, 2] = 1.0
-        for layer in self._layers:
-            normal[:, :2] -= layer.gradient(points)
+        slopes = self._ground.gradient(_points(xy))
+        normal = np.column_stack([-slopes, np.ones(len(slopes))])
         return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
     def patch(
@@ -108,17 +127,18 @@ class Terrain:
         """Give the index into ``spec.soils`` at points [m], Shape (n, 2) -> (n,)."""
         return self._soils.soil(_points(xy))
 
-    def albedo(self, xy: Array, texel_m: float) -> Array:
+    def albedo(self, xy: Array, texel_m: float, pebbles: bool = True) -> Array:
         """Give the albedo in 0..1 without detail finer than a texel.
 
         Args:
             xy: Points in the world [m], Shape (n, 2).
             texel_m: Distance of the samples [m]; finer detail would alias and is left out.
+            pebbles: Whether pebbles are drawn in, with their light and shade.
 
         Returns:
             Shape (n,).
         """
-        return self._albedo.albedo(_points(xy), texel_m)
+        return self._albedo.albedo(_points(xy), texel_m, pebbles)
 
     def rocks(self, box: Box, min_diameter_m: float = 0.0) -> Rocks:
         """Give the rocks whose centres lie in a box, of at least a diameter [m]."""
@@ -135,7 +155,7 @@ def build_terrain(spec: TerrainSpec, seed: int) -> Terrain:
     return Terrain(spec, seed)
 
 
-def _build_ground(spec: TerrainSpec, seed: int) -> Bands | DemGround:
+def _build_base(spec: TerrainSpec, seed: int) -> Bands | DemGround:
     rng = stream(seed, "terrain", "relief")
     return build_dem(spec.dem, spec.relief, rng) if spec.dem else build_relief(spec.relief, rng)
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rng import stream
+from lpet_sim.terrain.box import Box
 from lpet_sim.terrain.load import load_terrain_spec
 from lpet_sim.terrain.spec import CraterSpec, ReliefSpec, TerrainSpec
 from lpet_sim.terrain.terrain import Terrain, build_terrain
@@ -100,3 +104,15 @@ def test_craters_far_away_are_as_at_home() -> None:
     home = terrain.patch(0, 0, (300, 300), 0.5).std()
     away = terrain.patch(600_000, -600_000, (300, 300), 0.5).std()
     assert 0.8 < away / home < 1.25
+
+
+def test_a_terrain_let_go_leaves_memory_at_once() -> None:
+    """Nothing in a terrain holds it in a cycle, so that a sweep over many stays small."""
+    terrain = build_terrain(load_terrain_spec("exomars"), 1)
+    terrain.rocks(Box.around(0.0, 0.0, 3.0))
+    watch = weakref.ref(terrain)
+    gc.disable()
+    del terrain
+    gone = watch() is None
+    gc.enable()
+    assert gone
