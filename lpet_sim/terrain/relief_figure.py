@@ -47,7 +47,7 @@ def draw_relief(terrain: Terrain, box: Box, path: Path | str) -> None:
     ground = sample_ground(terrain, box, _NODES)
     figure = Figure(figsize=(9.0, 6.0), dpi=170)
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.0, 0.9, 0.96), projection="3d", computed_zorder=False)
+    axes = figure.add_axes((0.0, 0.02, 0.9, 0.98), projection="3d", computed_zorder=False)
     stretch = _vertical_stretch(ground)
     _draw_block(axes, ground, lit_colours(terrain, ground, stretch))
     count = _draw_dots(axes, terrain, box, ground, stretch)
@@ -109,7 +109,7 @@ def _is_seen(ground: Ground, points: Array, stretch: float) -> NDArray[np.bool_]
 
 def _dress_relief(axes: Axes3D, ground: Ground, stretch: float) -> None:
     spans = np.array([np.ptp(ground.x), np.ptp(ground.y), np.ptp(ground.z) * stretch])
-    axes.set_box_aspect(spans / spans.max(), zoom=1.25)
+    axes.set_box_aspect(spans / spans.max(), zoom=1.12)
     axes.view_init(_ELEVATION_DEG, _AZIMUTH_DEG)
     axes.set(xlabel="x, east [m]", ylabel="y, north [m]")
     axes.zaxis.set_major_locator(MaxNLocator(3))
