@@ -9,34 +9,17 @@ import numpy as np
 
 from lpet_sim.geometry import SE3
 from lpet_sim.recording import layout
-from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
+from lpet_sim.recording.arrays import Ints
 from lpet_sim.recording.calibration import Calibration
 from lpet_sim.recording.cloud import LandmarkCloud
+from lpet_sim.recording.motions import MovingEntity, Thinner
 from lpet_sim.recording.overview import Overview
 from lpet_sim.recording.scene import DrawnLink, Mesh
+from lpet_sim.recording.sighted import SightedImages
 from lpet_sim.recording.streams import SightingStream
-from lpet_sim.recording.tracks import Tails, TrackTails, colours, images_of
+from lpet_sim.recording.tracks import colours, images_of
 from lpet_sim.recording.truth import BodyTruth, Event, WheelTruth
 from lpet_sim.recording.visuals import EVENT_COLOUR, TRUTH_COLOUR, Pen
-
-MOTION_PERIOD_NS = NS_PER_S // 5
-
-
-class Thinner:
-    """Keeps the first row of each period, over any number of pieces."""
-
-    def __init__(self, period_ns: int = MOTION_PERIOD_NS) -> None:
-        """Start without a past."""
-        self._period_ns = period_ns
-        self._last = -(2**62)
-
-    def keep(self, t_ns: Ints) -> Ints:
-        """Give the indices of the rows to keep."""
-        periods = np.asarray(t_ns) // self._period_ns
-        kept = np.flatnonzero(np.diff(periods, prepend=self._last) > 0)
-        if len(periods):
-            self._last = int(periods[-1])
-        return kept
 
 
 class Sketch:
@@ -56,12 +39,11 @@ class Sketch:
         self._pen = pen
         self._stereo = calibration.stereo
         self._wheels = calibration.wheels.names if calibration.wheels is not None else ()
-        self._draw_every = draw_every
-        self._images_seen = 0
-        self._tails = TrackTails()
+        self._sighted = SightedImages(pen, draw_every)
         self._cloud = LandmarkCloud()
-        self._thinners: dict[str, Thinner] = {}
+        self._path = Thinner()
         self._links = {"": layout.ROVER}
+        self._moving: dict[str, MovingEntity] = {}
         self.overview = overview
 
     def cameras(self) -> None:
@@ -79,7 +61,7 @@ class Sketch:
 
     def poses(self, t_ns: Ints, T_world_body: SE3) -> None:
         """Remember where the rover was."""
-        kept = self._thinners.setdefault("path", Thinner()).keep(t_ns)
+        kept = self._path.keep(t_ns)
         self._cloud.add_poses(t_ns[kept], T_world_body[kept])
         self.overview = self.overview.covering(T_world_body.translation)
 
@@ -103,10 +85,9 @@ class Sketch:
     def motion(self, t_ns: Ints, motions: Mapping[str, SE3]) -> None:
         """Move parts of the rover in their parents, thinned to `MOTION_PERIOD_NS`."""
         for name, poses in motions.items():
-            kept = self._thinners.setdefault(f"link {name}", Thinner()).keep(t_ns)
-            if len(kept):
-                self._pen.poses(self._links[name], t_ns[kept], poses[kept])
-                self.overview = replace(self.overview, has_rover=True)
+            entity = self._links[name]
+            self._moving.setdefault(name, MovingEntity(self._pen, entity)).add(t_ns, poses)
+        self.overview = replace(self.overview, has_rover=True)
 
     def mesh(self, name: str, mesh: Mesh) -> None:
         """Draw a part of the ground."""
@@ -118,24 +99,17 @@ class Sketch:
 
     def sightings(self, sightings: SightingStream) -> None:
         """Draw sightings and the tails of their tracks on both images."""
-        times, drawn, tails = [], [], []
         for t_ns, ids, px in images_of(sightings):
-            tail = self._tails.add(ids, px)
+            self._sighted.add(t_ns, ids, px)
             if self._stereo is not None:
                 self._cloud.add_sightings(t_ns, ids, px, self._stereo)
-            if self._images_seen % self._draw_every == 0:
-                times.append(t_ns)
-                drawn.append((ids, px))
-                tails.append(tail)
-            self._images_seen += 1
         seen = self.overview.sightings + len(sightings.landmark_id)
         self.overview = replace(self.overview, sightings=seen)
-        if times:
-            self._draw_points(np.array(times), drawn)
-            self._draw_tails(np.array(times), tails)
 
     def finish(self, events: Sequence[Event]) -> None:
         """Draw what is known at the end only: whole paths, landmarks, where events happened."""
+        for moving in self._moving.values():
+            moving.flush()
         path = self._cloud.path()
         if self.overview.has_truth and len(path):
             length = float(np.linalg.norm(np.diff(path, axis=0), axis=-1).sum())
@@ -148,7 +122,8 @@ class Sketch:
             self._mark(events)
 
     def landmarks(self) -> None:
-        """Draw the landmarks that were placed."""
+        """Draw the last sightings, and the landmarks where they could be placed."""
+        self._sighted.flush()
         ids, p_world = self._cloud.landmarks()
         if len(ids):
             self._pen.cloud(layout.LANDMARKS, p_world, colours(ids))
@@ -157,20 +132,3 @@ class Sketch:
         places = self._cloud.places(np.array([event.t_ns for event in events]))
         texts = [event.kind.replace("_", " ") for event in events]
         self._pen.labels(layout.EVENT_PLACES, places, texts, EVENT_COLOUR)
-
-    def _draw_points(self, t_ns: Ints, drawn: list[tuple[Ints, Array]]) -> None:
-        counts = np.array([len(ids) for ids, _ in drawn])
-        rgba = colours(np.concatenate([ids for ids, _ in drawn]))
-        px = np.concatenate([px for _, px in drawn])
-        for eye, column in layout.EYE_COLUMNS.items():
-            entity = f"{layout.CAMERAS[eye]}/sightings"
-            self._pen.points_2d(entity, t_ns, px[:, [column, 2]], counts, rgba)
-
-    def _draw_tails(self, t_ns: Ints, tails: list[Tails]) -> None:
-        counts = np.array([len(tail.lengths) for tail in tails])
-        lengths = np.concatenate([tail.lengths for tail in tails])
-        rgba = colours(np.concatenate([tail.landmark_id for tail in tails]))
-        px = np.concatenate([tail.points_px for tail in tails])
-        for eye, column in layout.EYE_COLUMNS.items():
-            entity = f"{layout.CAMERAS[eye]}/tracks"
-            self._pen.strips_2d(entity, t_ns, px[:, [column, 2]], lengths, counts, rgba)

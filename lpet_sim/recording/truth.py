@@ -39,7 +39,8 @@ class WheelTruth(ArrayStruct):
         t_ns: Times since the start [ns], Shape (n,).
         drive_angle_rad: True accumulated angle of each wheel [rad], Shape (n, w).
         steer_angle_rad: True steering angle [rad], Shape (n, w).
-        slip: ``1 - v / (r omega)`` of each wheel, 0 where it does not turn, Shape (n, w).
+        slip: ``1 - v / (r omega)`` of each wheel, the mean since the sample before, 0 where it does
+            not turn, Shape (n, w).
         load_n: Normal force on each wheel [N], Shape (n, w).
         contact: `CONTACT_NONE`, `CONTACT_SOIL` or `CONTACT_ROCK`, Shape (n, w), uint8.
         joint_angle_rad: Suspension joints, for drawing the rover [rad], Shape (n, j).

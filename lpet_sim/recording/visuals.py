@@ -53,6 +53,7 @@ class Pen:
     def __init__(self, stream: rr.RecordingStream) -> None:
         """Set the world up: z is up, and the camera pair stands on the rover."""
         self._stream = stream
+        self._styled: set[str] = set()
         self._static("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
 
     def mesh(self, entity: str, mesh: Mesh) -> None:
@@ -101,7 +102,7 @@ class Pen:
     ) -> None:
         """Draw points on an image, those of time i being the next ``counts[i]`` rows."""
         columns = rr.Points2D.columns(positions=(px + _HALF_PIXEL).astype(np.float32), colors=rgba)
-        self._static(entity, rr.Points2D.from_fields(radii=rr.Radius.ui_points(2.5)))
+        self._style(entity, rr.Points2D.from_fields(radii=rr.Radius.ui_points(2.5)))
         self._send(entity, t_ns, columns.partition(counts))
 
     def strips_2d(
@@ -119,7 +120,7 @@ class Pen:
         offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
         strips = pa.ListArray.from_arrays(pa.array(offsets), points, type=_STRIP)
         columns = rr.LineStrips2D.columns(strips=strips, colors=rgba)
-        self._static(entity, rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(1.0)))
+        self._style(entity, rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(1.0)))
         self._send(entity, t_ns, columns.partition(counts))
 
     def path(self, entity: str, points_m: Array, rgba: RGBA, width: float) -> None:
@@ -132,7 +133,7 @@ class Pen:
     def marker(self, entity: str, t_ns: Ints, points_m: Array, rgba: RGBA) -> None:
         """Draw a point that moves along a path."""
         style = rr.Points3D.from_fields(radii=rr.Radius.ui_points(6.0), colors=[rgba])
-        self._static(entity, style)
+        self._style(entity, style)
         self._send(entity, t_ns, rr.Points3D.columns(positions=points_m.astype(np.float32)))
 
     def labels(self, entity: str, points_m: Array, texts: Sequence[str], rgba: RGBA) -> None:
@@ -180,6 +181,12 @@ class Pen:
     def document(self, entity: str, markdown: str) -> None:
         """Set a text."""
         self._static(entity, rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN))
+
+    def _style(self, entity: str, style: rr.AsComponents) -> None:
+        """Set the look of an entity, once."""
+        if entity not in self._styled:
+            self._styled.add(entity)
+            self._static(entity, style)
 
     def _static(self, entity: str, value: rr.AsComponents) -> None:
         self._stream.log(entity, value, static=True, strict=True)

@@ -10,10 +10,10 @@ import pytest
 from lpet_sim.geometry import SE3
 from lpet_sim.recording import layout
 from lpet_sim.recording.cloud import LandmarkCloud, Reservoir
+from lpet_sim.recording.motions import Thinner
 from lpet_sim.recording.overlay import add_estimate
 from lpet_sim.recording.reader import open_store
 from lpet_sim.recording.scene import DrawnLink, Mesh, join_meshes
-from lpet_sim.recording.sketch import Thinner
 from lpet_sim.recording.store import StoreReader
 from lpet_sim.recording.tracks import TrackTails, colours
 from lpet_sim.recording.writer import RecordingWriter
