@@ -38,14 +38,26 @@ QUARANTINE: dict[str, set[str]] = {
     },
     "ompl": {"lpet_sim/planning/route.py"},
     "cv2": {"lpet_sim/vision/detect.py"},
-    "rerun": {"lpet_sim/recording/store.py", "lpet_sim/recording/visuals.py"},
+    "rerun": {
+        "lpet_sim/recording/store.py",
+        "lpet_sim/recording/visuals.py",
+        "lpet_sim/recording/blueprint.py",
+    },
     "trimesh": {"lpet_sim/terrain/rock_shapes.py"},
     "rasterio": {"lpet_sim/terrain/dem.py"},
     "typer": {"lpet_sim/cli.py"},
 }
 """The files that may import a library, so that its upgrade touches one room."""
 
-GEOMETRY_LIBRARIES = {"numpy", "scipy", "__future__", "collections", "dataclasses", "typing"}
+GEOMETRY_LIBRARIES = {
+    "numpy",
+    "scipy",
+    "numba",
+    "__future__",
+    "collections",
+    "dataclasses",
+    "typing",
+}
 SEEDED = {"Generator", "PCG64", "BitGenerator", "SeedSequence"}
 BANNED_NAMES = re.compile(r"^(get_|process_|handle_)|Manager$|^utils?$")
 COVARIANCE = re.compile(r"^(P|cov|covariance)(_\w+)?$")
@@ -101,7 +113,7 @@ def quarantine_breaks(path: str, text: str) -> list[str]:
 
 
 def geometry_breaks(path: str, text: str) -> list[str]:
-    """Find what geometry imports beyond numpy, scipy and itself."""
+    """Find what geometry imports beyond numpy, scipy, their compiler numba and itself."""
     allowed = (*GEOMETRY_LIBRARIES, "lpet_sim")
     return [f"{path}:{n} imports {m}" for n, m in imports(text) if m.split(".")[0] not in allowed]
 

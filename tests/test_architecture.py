@@ -22,7 +22,7 @@ BREAKS: list[tuple[Rule, str, str]] = [
     (rules.import_order_breaks, "lpet_sim/rng.py", "from lpet_sim.geometry import SE3"),
     (rules.quarantine_breaks, "lpet_sim/rover/drive.py", "import mujoco.viewer"),
     (rules.quarantine_breaks, "lpet_sim/recording/x.py", "def f():\n    import rerun as rr"),
-    (rules.geometry_breaks, "lpet_sim/geometry/x.py", "import numba"),
+    (rules.geometry_breaks, "lpet_sim/geometry/x.py", "import cv2"),
     (rules.randomness_breaks, "lpet_sim/x.py", "import random"),
     (rules.randomness_breaks, "lpet_sim/x.py", "np.random.seed(1)"),
     (rules.randomness_breaks, "lpet_sim/x.py", "rng = np.random.default_rng(1)"),

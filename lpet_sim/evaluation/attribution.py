@@ -84,7 +84,7 @@ def counterfactual_streams(
     """Make exact wheel streams: as turned, without forced slip, and without any slip.
 
     Args:
-        wheels: True wheel states.
+        wheels: True wheel states; the slip of a sample is the mean since the sample before.
         forced: The forced slip events.
 
     Returns:
@@ -92,8 +92,7 @@ def counterfactual_streams(
     """
     turns = np.diff(wheels.drive_angle_rad, axis=0)
     free = 1.0 - _share_inside(wheels, forced)[:, None]
-    slip = 0.5 * (wheels.slip[1:] + wheels.slip[:-1])
-    made = (turns, turns * free, turns * free * (1.0 - slip))
+    made = (turns, turns * free, turns * free * (1.0 - wheels.slip[1:]))
     as_turned, unforced, gripping = (_stream(wheels, turn) for turn in made)
     return as_turned, unforced, gripping
 

@@ -1,5 +1,7 @@
 """Dead reckoning's error by cause, on planar drives whose causes are known exactly."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from lpet_sim.recording.streams import WheelStream
 from lpet_sim.recording.trajectory import Trajectory
 from lpet_sim.recording.truth import BodyTruth, Event, Truth, WheelTruth
 
-RADIUS_M, SPEED_MPS, SCALE, SLIP = 0.14, 0.1, 1.02, 0.05
+RADIUS_M, SPEED_MPS, SCALE, SLIP = 0.14, 0.1, 1.02, 0.10
 FORCED = Event(t_ns=round(20.03 * NS_PER_S), kind="forced_slip", duration_s=5.0)
 
 
@@ -23,13 +25,15 @@ def _reckon(wheels: WheelStream) -> Trajectory:
 
 
 def _drive(side_m: float = 0.0) -> tuple[WheelStream, Truth]:
-    """Drive 100 s: constant wheel speed, constant slip, one forced slip, a slide to the side."""
+    """Drive 100 s at constant wheel speed: slip, one forced slip, a slide to the side."""
     t = np.arange(2001) / 20
     t_ns = np.round(t * NS_PER_S).astype(np.int64)
     forced_s = np.clip(t - FORCED.t_ns / NS_PER_S, 0, FORCED.duration_s)
     angle = np.tile((SPEED_MPS * t / RADIUS_M)[:, None], (1, 6))
-    x = SPEED_MPS * (1 - SLIP) * (t - forced_s)
-    slip = np.full((2001, 6), SLIP)
+    # Firm ground in the first half, with the forced slip in it; soft ground in the second.
+    slip = np.tile(np.where(np.arange(2001) > 1000, SLIP, 0.0)[:, None], (1, 6))
+    free = SPEED_MPS * np.diff(t - forced_s, prepend=0.0)
+    x = np.cumsum(free * (1 - slip[:, 0]))
     position = np.stack([x, side_m * t / t[-1], 0 * x], axis=-1)
     zero = np.zeros((2001, 3))
     body = BodyTruth(t_ns, SE3(SE3.identity(2001).rotation, position), zero, zero.copy())
@@ -57,15 +61,24 @@ def test_each_cause_gets_its_closed_form() -> None:
     forced_m = SPEED_MPS * FORCED.duration_s
     np.testing.assert_allclose(parts["scale"], [(SCALE - 1) * 10.0, 0, 0], atol=1e-9)
     np.testing.assert_allclose(parts["forced_slip"], [forced_m, 0, 0], atol=1e-9)
-    np.testing.assert_allclose(parts["slip"], [SLIP * (10.0 - forced_m), 0, 0], atol=1e-9)
+    np.testing.assert_allclose(parts["slip"], [SLIP * 5.0, 0, 0], atol=1e-9)
     np.testing.assert_allclose(parts["model"], [0, -0.3, 0], atol=1e-9)
+
+
+def test_a_slip_is_that_of_the_interval_before_its_sample() -> None:
+    """A slip told half an interval late would leave a residue in the model's part."""
+    measured, truth = _drive()
+    assert truth.wheels is not None
+    late = dataclasses.replace(truth.wheels, slip=np.roll(truth.wheels.slip, 1, axis=0))
+    parts = attribute_error(measured, dataclasses.replace(truth, wheels=late), _reckon)
+    assert abs(parts.contributions_m["model"][0]) > 1e-4
 
 
 def test_ratios_are_of_the_true_distance() -> None:
     """Lengths over the distance driven."""
     measured, truth = _drive()
     split = attribute_error(measured, truth, _reckon)
-    np.testing.assert_allclose(split.distance_m, 9.5 * 0.95, rtol=1e-9)
+    np.testing.assert_allclose(split.distance_m, 9.5 - SLIP * 5.0, rtol=1e-9)
     np.testing.assert_allclose(split.ratios["scale"], 0.2 / split.distance_m, rtol=1e-9)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lpet_sim.geometry import so3
+from lpet_sim.geometry import compiled, so3
 from tests.laws.samples import numerical_jacobian, rotation_vectors
 
 
@@ -135,3 +135,14 @@ def test_stacks_of_any_shape_go_through() -> None:
     assert so3.to_rpy(R).shape == (4, 2, 3)
     assert so3.to_quat_wxyz(R).shape == (4, 2, 4)
     np.testing.assert_allclose(so3.from_rpy(so3.to_rpy(R)), R, atol=1e-13)
+
+
+def test_compiled_rotations_are_those_of_the_stacks() -> None:
+    """Exponential map over all samples, logarithm below a quarter turn, and the products."""
+    for phi in rotation_vectors("a", count=3):
+        R = compiled.small_exp(phi)
+        np.testing.assert_allclose(R, so3.exp(phi), atol=1e-15)
+        np.testing.assert_allclose(compiled.times(R, phi), phi, atol=1e-14)
+        np.testing.assert_allclose(compiled.times_transposed(R, R), np.eye(3), atol=1e-14)
+        if np.linalg.norm(phi) < np.pi / 2:
+            np.testing.assert_allclose(compiled.small_log(R), phi, atol=1e-15)
