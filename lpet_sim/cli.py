@@ -1,0 +1,189 @@
+"""The ``lpet`` command."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as ProgressBar
+from rich.table import Table
+
+from lpet_sim.errors import LpetError
+from lpet_sim.progress import Progress
+
+app = typer.Typer(
+    name="lpet",
+    help="Localization performance evaluation for planetary rovers.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+import_app = typer.Typer(help="Make a recording of a real data set.", no_args_is_help=True)
+app.add_typer(import_app, name="import")
+
+RecordingArgument = Annotated[Path, typer.Argument(metavar="RUN.rrd", help="A recording.")]
+SeedOption = Annotated[int, typer.Option(help="Seed of everything random.")]
+RequirementOption = Annotated[
+    Path | None, typer.Option(help="YAML of the requirement; 1 % and 1 deg throughout if absent.")
+]
+
+
+def main() -> None:
+    """Run the command; bad input ends in one sentence and exit code 2."""
+    logging.basicConfig(level=logging.WARNING, format="lpet: %(message)s")
+    try:
+        app()
+    except LpetError as error:
+        Console(stderr=True, soft_wrap=True, highlight=False).print(f"lpet: {error}", markup=False)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+@contextmanager
+def _bar(title: str) -> Iterator[Progress]:
+    """Show a progress bar on stderr while the block runs."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    console = Console(stderr=True)
+    with ProgressBar(*columns, TimeElapsedColumn(), console=console) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda fraction: bar.update(task, completed=fraction)
+
+
+def _print_tables(tables: Iterable[Table]) -> None:
+    console = Console()
+    for table in tables:
+        console.print(table)
+
+
+def _wrote(*paths: Path) -> None:
+    for path in paths:
+        typer.echo(f"wrote {path}")
+
+
+@app.command()
+def simulate(
+    spec: Annotated[Path, typer.Argument(metavar="SPEC.yaml", help="The traverse.")],
+    seed: SeedOption = 0,
+    out: Annotated[Path, typer.Option(help="The recording to write.")] = Path("run.rrd"),
+) -> None:
+    """Drive a traverse in simulation and record it."""
+    from lpet_sim.sweep.simulate import simulate as run
+    from lpet_sim.sweep.traverse import TraverseSpec
+
+    traverse = TraverseSpec.from_yaml(spec)
+    with _bar(f"driving {traverse.name}") as progress:
+        run(traverse, seed, out, progress)
+    _wrote(out)
+
+
+@app.command()
+def sight(
+    run: RecordingArgument,
+    spec: Annotated[Path | None, typer.Option(help="YAML of the front end.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write here, not in place.")] = None,
+) -> None:
+    """Find and track landmarks in a recording's images."""
+    from lpet_sim.sweep.sighting import sight_recording
+    from lpet_sim.vision.spec import FrontEndSpec
+
+    front_end = FrontEndSpec() if spec is None else FrontEndSpec.from_yaml(spec)
+    with _bar(f"sighting {run.name}") as progress:
+        summary = sight_recording(run, out or run, front_end, progress)
+    typer.echo(str(summary))
+    _wrote(out or run)
+
+
+@app.command()
+def estimate(
+    run: RecordingArgument,
+    estimator: Annotated[
+        list[str] | None, typer.Option(help="Which estimator; may be given again. All if absent.")
+    ] = None,
+) -> None:
+    """Run estimators on a recording and lay their estimates over it."""
+    from estimators import ESTIMATORS
+    from lpet_sim.sweep.score import estimate_recording
+
+    names = tuple(estimator or ESTIMATORS)
+    with _bar(f"estimating {run.name}") as progress:
+        estimate_recording(run, names, progress)
+    typer.echo(f"added {', '.join(names)}")
+    _wrote(run)
+
+
+@app.command()
+def evaluate(
+    run: RecordingArgument,
+    requirement: RequirementOption = None,
+    check: Annotated[bool, typer.Option(help="Exit with 1 if any verdict is FAIL.")] = False,
+) -> None:
+    """Score a recording's estimates against its truth, and hold them to a requirement."""
+    from lpet_sim.evaluation import Requirement
+    from lpet_sim.sweep.report import score_tables
+    from lpet_sim.sweep.score import score_recording
+
+    held_to = Requirement() if requirement is None else Requirement.from_yaml(requirement)
+    score = score_recording(run)
+    _print_tables(score_tables(score, held_to))
+    if check and not all(held_to.check(result).passed for result in score.results):
+        raise typer.Exit(1)
+
+
+@app.command()
+def view(run: RecordingArgument) -> None:
+    """Open a recording in the Rerun viewer."""
+    from lpet_sim.recording.view import view as open_viewer
+
+    open_viewer(run)
+
+
+@app.command()
+def terrain(
+    spec: Annotated[str, typer.Argument(metavar="SPEC.yaml", help="A terrain, or a preset.")],
+    seed: SeedOption = 0,
+    out: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path("out/terrain"),
+    size: Annotated[float, typer.Option(min=5, max=2000, help="Side of the map [m].")] = 50.0,
+) -> None:
+    """Draw a terrain: the map with its rocks, and the relief in 3D."""
+    from lpet_sim.sweep.report import terrain_tables
+    from lpet_sim.sweep.scenery import draw_terrain
+
+    summary, paths = draw_terrain(spec, seed, size, out)
+    _print_tables(terrain_tables(summary))
+    _wrote(*paths)
+
+
+@import_app.command("kitti")
+def import_kitti(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the sequence.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT.rrd", help="The recording to write.")],
+) -> None:
+    """Import a KITTI odometry sequence."""
+    from lpet_sim.sweep.importing import import_kitti as run
+
+    with _bar(f"importing {folder.name}") as progress:
+        run(folder, out, progress)
+    _wrote(out)
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder to write into.")] = Path("out/demo"),
+    seed: SeedOption = 1,
+) -> None:
+    """Drive among rocks, localize, and score: the whole chain in minutes."""
+    from lpet_sim.study import run_demo
+    from lpet_sim.sweep.report import score_tables
+
+    with _bar("starting") as progress:
+        study = run_demo(out, seed, progress)
+    _print_tables(score_tables(study.score, study.requirement))
+    _wrote(*study.written)

@@ -1,0 +1,56 @@
+"""Scores and summaries as tables on a terminal; made here, printed by the command line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from rich.table import Table
+
+from lpet_sim.evaluation import Requirement
+from lpet_sim.evaluation.tables import attribution_table, result_table, segment_table
+from lpet_sim.sweep.score import Score
+from lpet_sim.terrain.summary import TerrainSummary
+
+
+def score_tables(score: Score, requirement: Requirement) -> Iterator[Table]:
+    """Make the tables of a score: results with verdicts, segment drift, error by cause.
+
+    Args:
+        score: The score.
+        requirement: What the results are held to.
+    """
+    source = score.recording.manifest
+    seed = "" if source.seed is None else f", seed {source.seed}"
+    yield result_table(score.results, requirement, f"{source.source}{seed}")
+    yield segment_table(score.results)
+    if score.attribution is not None:
+        yield attribution_table(score.attribution)
+
+
+def terrain_tables(summary: TerrainSummary) -> Iterator[Table]:
+    """Make the tables of a terrain: its figures, and its rocks beside their size law."""
+    facts = Table(title=f"{summary.name}: {summary.area_m2:g} m2")
+    facts.add_column("quantity")
+    facts.add_column("value", justify="right")
+    facts.add_row("relief [m]", f"{summary.relief_m:.2f}")
+    facts.add_row("RMS slope at 1 m [deg]", f"{math.degrees(summary.rms_slope_1m_rad):.2f}")
+    for name, share in summary.soil_shares:
+        facts.add_row(f"soil '{name}' [%]", f"{100 * share:.1f}")
+    yield facts
+    if summary.rock_bins:
+        yield _rock_table(summary)
+
+
+def _rock_table(summary: TerrainSummary) -> Table:
+    rocks = Table(title="rocks by diameter")
+    for heading in ("from [m]", "to [m]", "found", "size law"):
+        rocks.add_column(heading, justify="right")
+    for rock_bin in summary.rock_bins:
+        rocks.add_row(
+            f"{rock_bin.diameter_min_m:.2f}",
+            f"{rock_bin.diameter_max_m:.2f}",
+            f"{rock_bin.count}",
+            f"{rock_bin.expected:.1f}",
+        )
+    return rocks

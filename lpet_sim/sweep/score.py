@@ -1,0 +1,102 @@
+"""Run estimators on a recording and score them: the one place where both are in hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from estimators import ESTIMATORS, build_estimator
+from estimators.dead_reckoning import DeadReckoning
+from lpet_sim.errors import RecordingError
+from lpet_sim.evaluation import RunResult, evaluate
+from lpet_sim.evaluation.attribution import ErrorAttribution, attribute_error
+from lpet_sim.evaluation.errors import ErrorSeries, error_series
+from lpet_sim.progress import Progress, silent, track
+from lpet_sim.recording.estimate import Estimate
+from lpet_sim.recording.overlay import add_estimates
+from lpet_sim.recording.reader import read_estimates, read_recording
+from lpet_sim.recording.recording import Recording
+from lpet_sim.recording.streams import WheelStream
+from lpet_sim.recording.trajectory import Trajectory
+from lpet_sim.recording.truth import Truth
+
+
+@dataclass(frozen=True)
+class Score:
+    """What the estimators in a recording are worth.
+
+    Attributes:
+        recording: The recording.
+        estimates: The estimates found in it.
+        results: Their scores, in the same order.
+        attribution: Dead reckoning's error by cause, None where the truth holds no wheels.
+    """
+
+    recording: Recording
+    estimates: tuple[Estimate, ...]
+    results: tuple[RunResult, ...]
+    attribution: ErrorAttribution | None
+
+    @property
+    def truth(self) -> Truth:
+        """What really happened."""
+        assert self.recording.truth is not None
+        return self.recording.truth
+
+
+def estimate_recording(
+    path: Path, names: Sequence[str] = tuple(ESTIMATORS), progress: Progress = silent
+) -> tuple[Estimate, ...]:
+    """Run estimators on a recording's measurements and lay their estimates over it.
+
+    Args:
+        path: The recording; it is replaced as a whole once all estimates are there.
+        names: Which estimators.
+        progress: Called after each estimator.
+
+    Raises:
+        UnknownNameError: A name is not an estimator's.
+        RecordingError: The recording cannot be read or lacks a stream.
+    """
+    built = [build_estimator(name) for name in names]
+    recording = read_recording(path)
+    measurements = recording.measurements
+    estimates = tuple(e.estimate(measurements) for e in track(built, len(built), progress))
+    add_estimates(path, [(estimate, _errors(estimate, recording)) for estimate in estimates])
+    return estimates
+
+
+def _errors(estimate: Estimate, recording: Recording) -> ErrorSeries | None:
+    """Give the errors that the recording's curves show, where there is a truth."""
+    if recording.truth is None:
+        return None
+    return error_series(estimate.trajectory, recording.truth.trajectory)
+
+
+def score_recording(path: Path) -> Score:
+    """Score every estimate in a recording against its truth.
+
+    Raises:
+        RecordingError: The recording cannot be read, holds no truth, or no estimates.
+    """
+    recording = read_recording(path)
+    estimates = tuple(read_estimates(path).values())
+    if recording.truth is None:
+        raise RecordingError(f"{path} holds no truth to score against; give one that does")
+    if not estimates:
+        raise RecordingError(f"{path} holds no estimates; run 'lpet estimate {path}' first")
+    results = tuple(evaluate(estimate, recording.truth) for estimate in estimates)
+    return Score(recording, estimates, results, attribute_dead_reckoning(recording))
+
+
+def attribute_dead_reckoning(recording: Recording) -> ErrorAttribution | None:
+    """Split dead reckoning's error by cause, or give None where wheels are not known."""
+    measurements, truth = recording.measurements, recording.truth
+    if measurements.wheels is None or truth is None or truth.wheels is None:
+        return None
+
+    def dead_reckon(wheels: WheelStream) -> Trajectory:
+        return DeadReckoning().estimate(replace(measurements, wheels=wheels)).trajectory
+
+    return attribute_error(measurements.wheels, truth, dead_reckon)

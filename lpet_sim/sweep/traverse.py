@@ -1,0 +1,94 @@
+"""One traverse: what it is, and how it becomes a recording."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from itertools import pairwise
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field
+
+import lpet_sim
+from lpet_sim.planning.clearance import RouteSpec
+from lpet_sim.planning.route import nearest_clear, plan_route
+from lpet_sim.recording.recording import Manifest
+from lpet_sim.rover.spec import DriveSpec, RoverSpec
+from lpet_sim.sensors.suite import SensorSuiteSpec
+from lpet_sim.spec import Spec
+from lpet_sim.terrain.load import load_terrain_spec
+from lpet_sim.terrain.spec import TerrainSpec
+from lpet_sim.terrain.terrain import Terrain
+from lpet_sim.vision.spec import FrontEndSpec
+
+_PACKAGES = ("numpy", "scipy", "mujoco", "opencv-python-headless", "rerun-sdk", "ompl", "numba")
+
+
+def _named_terrain(value: object) -> object:
+    """Let a terrain be a preset's name or a file in place of its fields."""
+    return load_terrain_spec(value) if isinstance(value, str) else value
+
+
+class ImagesSpec(Spec):
+    """When image pairs are taken, and how many of them are kept.
+
+    Attributes:
+        period_s: Time between pairs, a multiple of the inertial unit's; 0.72 s is 2 cm at
+            100 m/h (the paper).
+        keep_every: 1 keeps all pairs in the recording, n every n-th, 0 none; the front end sees
+            them all.
+        front_end: Parameters of the vision front end; None leaves sighting for later.
+    """
+
+    period_s: Annotated[float, Field(gt=0)] = 0.72
+    keep_every: Annotated[int, Field(ge=0)] = 1
+    front_end: FrontEndSpec | None = FrontEndSpec()
+
+
+class TraverseSpec(Spec):
+    """A whole traverse: ground, rover, path, sensors.
+
+    Attributes:
+        name: What the traverse is called.
+        terrain: The ground, or the name of a preset, or the path of a YAML file.
+        rover: Which rover.
+        drive: Path, speed, stops and forced slips.
+        route: How to plan a path among the rocks from the drive's first waypoint over the others
+            to the last; None drives straight from waypoint to waypoint.
+        move_within_m: How far, along x and y, a waypoint that is not clear of rocks may be moved
+            before the route is planned; 0 holds the waypoints to be clear.
+        sensors: What the rover carries.
+        images: When images are taken; None: no images are rendered.
+    """
+
+    name: str = "traverse"
+    terrain: Annotated[TerrainSpec, BeforeValidator(_named_terrain)]
+    rover: RoverSpec = RoverSpec()
+    drive: DriveSpec
+    route: RouteSpec | None = RouteSpec()
+    move_within_m: Annotated[float, Field(ge=0)] = 0.0
+    sensors: SensorSuiteSpec = SensorSuiteSpec()
+    images: ImagesSpec | None = ImagesSpec()
+
+
+def planned_drive(spec: TraverseSpec, terrain: Terrain, seed: int) -> DriveSpec:
+    """Put the path among the rocks in place of the drive's waypoints.
+
+    Raises:
+        PlanningError: There is no path from one waypoint to the next.
+    """
+    if spec.route is None:
+        return spec.drive
+    corners = spec.drive.waypoints_m
+    if spec.move_within_m > 0:
+        corners = tuple(nearest_clear(terrain, c, spec.move_within_m, spec.route) for c in corners)
+    path = [corners[0]]
+    for start, goal in pairwise(corners):
+        path.extend(plan_route(terrain, start, goal, spec.route, seed)[1:])
+    return spec.drive.model_copy(update={"waypoints_m": tuple(path)})
+
+
+def manifest_of(spec: TraverseSpec, drive: DriveSpec, seed: int) -> Manifest:
+    """Say where a simulated recording comes from: specs as given, the path as planned, versions."""
+    specs: dict[str, Any] = {"traverse": spec.to_mapping(), "drive": drive.to_mapping()}
+    versions = {name: version(name) for name in _PACKAGES} | {"lpet": lpet_sim.__version__}
+    return Manifest(source="simulation", seed=seed, specs=specs, versions=versions)
