@@ -192,10 +192,10 @@ class RockTable:
         index = np.searchsorted(self._counts_before, count_above, side="right") - 1
         index = np.clip(index, 0, len(self._classes) - 1)
         out = np.empty(len(count_above))
-        for i, one in enumerate(self._classes):
+        for i in np.unique(index):
             chosen = index == i
             rank = (count_above[chosen] - self._counts_before[i]) / max(self._counts[i], 1e-300)
-            out[chosen] = one.diameter_at(np.clip(rank, 0.0, 1.0))
+            out[chosen] = self._classes[i].diameter_at(np.clip(rank, 0.0, 1.0))
         return out
 
 
