@@ -58,6 +58,17 @@ def test_an_error_that_comes_and_goes_fails_throughout_but_not_at_the_end() -> N
     assert Requirement(yaw_rad=math.radians(2)).check(result).passed
 
 
+def test_the_worst_attitude_is_the_largest_of_either_sign() -> None:
+    """A pitch of -1.5 deg is worse than one of 0.4 deg, and the end keeps its sign."""
+    truth = straight(20.0, 51)
+    rpy = np.zeros((51, 3))
+    rpy[10, 1], rpy[20, 1], rpy[50, 1] = np.radians([0.4, -1.5, -0.2])
+    estimate = Trajectory(truth.t_ns, SE3.from_rpy(rpy, truth.T_world_body.translation))
+    result = evaluate(as_estimate(estimate), as_truth(truth))
+    np.testing.assert_allclose(np.degrees(result.worst_attitude_rad), [0, 1.5, 0], atol=1e-9)
+    np.testing.assert_allclose(np.degrees(result.endpoint_attitude_rad), [0, -0.2, 0], atol=1e-9)
+
+
 def test_each_axis_is_held_to_its_own_limit() -> None:
     """A roll error fails the roll lines only."""
     truth = straight(20.0, 51)
