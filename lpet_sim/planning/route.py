@@ -8,6 +8,7 @@ makes equal seeds give routes that are equal to the bit, whatever was planned be
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -54,9 +55,33 @@ def plan_route(
     Reference:
         Karaman and Frazzoli (2011), Sampling-based algorithms for optimal motion planning.
     """
-    clearance = map_clearance(terrain, _box(start_xy, goal_xy, spec.margin_m), spec)
-    _check_reachable(clearance, start_xy, goal_xy, spec)
-    corners = _solve(clearance, start_xy, goal_xy, spec, seed)
+    return plan_route_over(terrain, (start_xy, goal_xy), spec, seed)
+
+
+def plan_route_over(
+    terrain: Ground, places_xy: Sequence[Point], spec: RouteSpec, seed: int
+) -> tuple[Point, ...]:
+    """Plan a route from place to place, as `plan_route` does for two.
+
+    Args:
+        terrain: The terrain.
+        places_xy: Start, places to pass in this order, and goal [m], at least two.
+        spec: What to keep clear of.
+        seed: Any integer; equal seeds give equal routes.
+
+    Returns:
+        Corners from start to goal over all places [m].
+
+    Raises:
+        PlanningError: A place is not clear, or no clear way joins two of them; it says which.
+    """
+    _check_finite(places_xy)
+    clearance = map_clearance(terrain, _box(places_xy, spec.margin_m), spec)
+    corners = [places_xy[0]]
+    for k, (start, goal) in enumerate(pairwise(places_xy)):
+        _check_reachable(clearance, start, goal, spec)
+        leg_seed = int(stream(seed, "planning", "route", k).integers(1, 2**31))
+        corners += _solve(clearance, start, goal, spec, leg_seed)[1:]
     return tuple(with_turns_on_the_spot(clearance, corners, spec))
 
 
@@ -72,7 +97,7 @@ def nearest_clear(terrain: Ground, xy: Point, within_m: float, spec: RouteSpec) 
     Raises:
         PlanningError: There is none.
     """
-    found = map_clearance(terrain, _box(xy, xy, within_m), spec).nearest_free(xy)
+    found = map_clearance(terrain, _box([xy], within_m), spec).nearest_free(xy)
     if found is None:
         raise PlanningError(
             f"within {within_m:g} m of {_name(xy)} no place is {spec.needed_m:.2f} m clear; "
@@ -81,10 +106,16 @@ def nearest_clear(terrain: Ground, xy: Point, within_m: float, spec: RouteSpec) 
     return found
 
 
-def _box(a: Point, b: Point, margin_m: float) -> Box:
-    low, high = (min(a[0], b[0]), min(a[1], b[1])), (max(a[0], b[0]), max(a[1], b[1]))
-    tight = (low[0] - 1e-3, low[1] - 1e-3, high[0] + 1e-3, high[1] + 1e-3)
-    return Box(*tight).grown(margin_m)
+def _box(places: Sequence[Point], margin_m: float) -> Box:
+    x, y = zip(*places, strict=True)
+    # A box may not be empty, and a margin may be 0.
+    return Box(min(x) - 1e-3, min(y) - 1e-3, max(x) + 1e-3, max(y) + 1e-3).grown(margin_m)
+
+
+def _check_finite(places: Sequence[Point]) -> None:
+    for xy in places:
+        if not all(map(math.isfinite, xy)):
+            raise PlanningError(f"the place {_name(xy)} must be finite")
 
 
 def _name(xy: Point) -> str:
@@ -93,8 +124,6 @@ def _name(xy: Point) -> str:
 
 def _check_reachable(clearance: ClearanceMap, start: Point, goal: Point, spec: RouteSpec) -> None:
     """Say at once, from the map, why there is no route; what is left is a matter of search."""
-    if not all(map(math.isfinite, (*start, *goal))):
-        raise PlanningError(f"start {_name(start)} and goal {_name(goal)} must be finite")
     for what, xy in (("start", start), ("goal", goal)):
         if not clearance.is_clear(xy, xy):
             row, column = clearance.node(xy)
@@ -124,7 +153,7 @@ def _solve(
     clearance: ClearanceMap, start: Point, goal: Point, spec: RouteSpec, seed: int
 ) -> list[Point]:
     # First the seed, then everything else: see the head of the file.
-    ou.RNG.setSeed(int(stream(seed, "planning", "route").integers(1, 2**31)))
+    ou.RNG.setSeed(seed)
     space = _space(clearance)
     problem = _problem(space, start, goal)
     planner = og.RRTstar(space)

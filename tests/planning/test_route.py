@@ -11,7 +11,12 @@ import pytest
 
 from lpet_sim.errors import PlanningError
 from lpet_sim.planning.clearance import Point, RouteSpec, map_clearance
-from lpet_sim.planning.route import nearest_clear, plan_route, with_turns_on_the_spot
+from lpet_sim.planning.route import (
+    nearest_clear,
+    plan_route,
+    plan_route_over,
+    with_turns_on_the_spot,
+)
 from lpet_sim.rng import stream
 from lpet_sim.rover.path import plan_legs
 from lpet_sim.rover.spec import DriveSpec
@@ -81,6 +86,19 @@ def test_another_process_plans_the_same_route_and_prints_nothing_else() -> None:
     )
     assert done.stdout.strip() == repr(plan_route(_scattered(), START, GOAL, SPEC, 1))
     assert done.stderr == ""
+
+
+def test_a_route_over_several_places_passes_them_in_order() -> None:
+    """And its drive keeps clear at the places too."""
+    places = (START, (6.0, -5.0), GOAL)
+    terrain = FlatTerrain([(6.0, -3.6, 0.5), (2.5, -2.5, 0.5)])
+    route = plan_route_over(terrain, places, SPEC, 1)
+    assert [route.index(place) for place in places] == sorted(route.index(p) for p in places)
+    legs = plan_legs(route, SPEC.min_turn_radius_m, SPEC.corner_cut_m)
+    driven = np.concatenate([leg.xy for leg in legs])
+    rocks = terrain.rocks(Box(-20, -20, 30, 30))
+    away = np.linalg.norm(driven[:, None] - rocks.p_world_rock[None, :, :2], axis=2)
+    assert (away - rocks.reach_m).min() >= SPEC.clearance_m
 
 
 def test_open_ground_is_crossed_in_a_straight_line() -> None:
