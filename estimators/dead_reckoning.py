@@ -74,18 +74,20 @@ def _covariances(
     A scale error s is ``du = s u``, and ``J_r(u) u = u``. The start is given: a micrometre and a
     microradian stand for it, so that every covariance is positive definite.
     """
-    P = 1e-12 * np.eye(7)
-    P[6, 6] = scale_sigma**2
+    start = np.full(7, 1e-12)
+    start[6] = scale_sigma**2
+    P = gaussian.independent(start)
     out = np.zeros((len(twists) + 1, 6, 6))
+    out[0] = P[:6, :6]
+    added = np.zeros(7)
     for k in range(len(twists)):
-        F, cov = np.eye(7), np.zeros((7, 7))
+        F = np.eye(7)
         F[:6, :6], _ = step_jacobians(twists[k])
         F[:6, 6] = twists[k]
         kept = np.exp(-rolled_m[k] / tilt_length)
         F[3:5] *= kept
-        for i in range(6):
-            cov[i, i] = per_metre[i] * rolled_m[k]
-        cov[3, 3] = cov[4, 4] = tilt_sigma**2 * (1.0 - kept**2)
-        P = gaussian.propagate(P, F, cov)
+        added[:6] = per_metre * rolled_m[k]
+        added[3:5] = tilt_sigma**2 * (1.0 - kept**2)
+        P = gaussian.propagate(P, F, gaussian.independent(added))
         out[k + 1] = P[:6, :6]
     return out

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from estimators import gaussian
-from estimators.jacobians import hat, se3_exp, step_jacobians
+from estimators.jacobians import hat, put, se3_exp, step_jacobians
 from lpet_sim.geometry.compiled import small_exp, small_log
 from lpet_sim.recording.arrays import Array
 
@@ -117,37 +117,45 @@ def body_twist(
 
 @njit(cache=True)
 def twist_jacobians(moved: Array, dt: float, contact: Array) -> tuple[Array, Array]:
-    """Give the derivatives of `body_twist` by the bias, Shape (6, 3), and by the scale, (6,)."""
-    by_turn = np.zeros((6, 3))
-    by_turn[:3] = hat(contact)
-    by_turn[3:] = np.eye(3)
-    by_scale = np.zeros(6)
-    by_scale[:2] = moved
-    return -dt * by_turn, by_scale
+    """Give the derivatives of `body_twist` by the bias, Shape (6, 3), and the scale, (6, 1)."""
+    by_bias, by_scale = np.zeros((6, 3)), np.zeros((6, 1))
+    put(by_bias, 0, 0, -dt * hat(contact))
+    put(by_bias, 3, 0, -dt * np.eye(3))
+    by_scale[0, 0], by_scale[1, 0] = moved[0], moved[1]
+    return by_bias, by_scale
 
 
 @njit(cache=True)
 def predict(P: Array, u: Array, moved: Array, rolled: float, dt: float, c: Constants) -> Array:
-    """Carry the covariance over one driven interval."""
+    """Carry the covariance over one driven interval: gyro, wheels and biases add their noise."""
     by_bias, by_scale = twist_jacobians(moved, dt, c.contact)
-    F, cov = np.eye(SIZE), np.zeros((SIZE, SIZE))
     to_next, by_twist = step_jacobians(u)
-    F[:6, :6] = to_next
-    F[:6, 6:9] = by_twist @ by_bias
-    F[:6, 12] = by_twist @ by_scale
-    cov[:6, :6] = (c.random_walk[0] ** 2 / dt) * (by_bias @ by_bias.T)
+    F, B, variance = np.eye(SIZE), np.zeros((SIZE, 12)), bias_drift(dt, c)
+    put(F, 0, 0, to_next)
+    put(F, 0, 6, by_twist @ by_bias)
+    put(F, 0, 12, by_twist @ by_scale)
+    put(B, 0, 0, F[:6, 6:9])
+    put(B, 0, 3, by_twist[:, :3])
+    put(B, 6, 6, np.eye(6))
     for i in range(3):
-        cov[i, i] += c.variance_per_m[i] * rolled
-    return gaussian.propagate(P, F, cov + _bias_drift(dt, c))
+        variance[i] = c.random_walk[0] ** 2 / dt
+        variance[3 + i] = c.variance_per_m[i] * rolled
+    return gaussian.propagate(P, F, gaussian.of_noise(B, variance))
 
 
 @njit(cache=True)
-def _bias_drift(dt: float, c: Constants) -> Array:
-    cov = np.zeros((SIZE, SIZE))
+def bias_drift(dt: float, c: Constants) -> Array:
+    """Give the variance that an interval adds: to the six biases, after six zeros, Shape (12,)."""
+    out = np.zeros(12)
     for i in range(3):
-        cov[6 + i, 6 + i] = c.bias_walk[0] ** 2 * dt
-        cov[9 + i, 9 + i] = c.bias_walk[1] ** 2 * dt
-    return cov
+        out[6 + i], out[9 + i] = c.bias_walk[0] ** 2 * dt, c.bias_walk[1] ** 2 * dt
+    return out
+
+
+@njit(cache=True)
+def drift(P: Array, dt: float, c: Constants) -> Array:
+    """Carry the covariance over one interval of rest: the biases walk, the pose is held."""
+    return gaussian.with_noise(P, np.append(bias_drift(dt, c), 0.0))
 
 
 @njit(cache=True)
@@ -158,9 +166,9 @@ def rest_jacobian(R: Array, up: Array) -> Array:
     to first order with ``a = R^T up``.
     """
     H = np.zeros((6, SIZE))
-    H[:3, 6:9] = np.eye(3)
-    H[3:, 3:6] = hat(R.T @ up)
-    H[3:, 9:12] = np.eye(3)
+    put(H, 0, 6, np.eye(3))
+    put(H, 3, 3, hat(R.T @ up))
+    put(H, 3, 9, np.eye(3))
     return H
 
 
@@ -170,12 +178,10 @@ def rest_noise(duration: float, c: Constants) -> Array:
 
     ``N^2/T`` each; the velocity is read at both ends with a variance of ``q^2/12``.
     """
-    cov = np.zeros((6, 6))
-    rounding = c.quantum**2 / 6.0 / duration**2
-    for i in range(3):
-        cov[i, i] = c.random_walk[0] ** 2 / duration
-        cov[3 + i, 3 + i] = c.random_walk[1] ** 2 / duration + rounding
-    return cov
+    variance = np.empty(6)
+    variance[:3] = c.random_walk[0] ** 2 / duration
+    variance[3:] = c.random_walk[1] ** 2 / duration + c.quantum**2 / 6.0 / duration**2
+    return gaussian.independent(variance)
 
 
 @njit(cache=True)
@@ -203,7 +209,7 @@ def run(R: Array, p: Array, data: Inputs, c: Constants) -> tuple[Array, Array, A
             held += data.dt[k]
             mean[:3] += data.turns[k]
             mean[3:] += data.speeds[k]
-            P = P + _bias_drift(data.dt[k], c)
+            P = drift(P, data.dt[k], c)
             last = k + 1 == n or not data.rest[k + 1]
             if last or held >= c.rest_block:
                 R, p, bias, P, rejected[k + 1] = _stand(R, p, bias, P, mean / held, held, c)
@@ -221,7 +227,7 @@ def _start_covariance(c: Constants) -> Array:
     """The start is given: a micrometre and a microradian keep the covariance positive definite."""
     sigma = np.full(SIZE, _START_SIGMA)
     sigma[6:9], sigma[9:12], sigma[12] = c.bias_sigma[0], c.bias_sigma[1], c.scale_sigma
-    return np.diag(sigma**2)
+    return gaussian.independent(sigma**2)
 
 
 @njit(cache=True)

@@ -16,6 +16,12 @@ from lpet_sim.recording.arrays import Array
 
 
 @njit(cache=True)
+def with_noise(P: Array, variance: Array) -> Array:
+    """Add independent noise of the given variances, Shape (n,), to a state that stays put."""
+    return P + np.diag(variance)
+
+
+@njit(cache=True)
 def symmetrise(P: Array) -> Array:
     """Give ``(P + P^T) / 2``, Shape (n, n)."""
     n = P.shape[0]
@@ -24,6 +30,27 @@ def symmetrise(P: Array) -> Array:
         for j in range(n):
             out[i, j] = 0.5 * (P[i, j] + P[j, i])
     return out
+
+
+@njit(cache=True)
+def independent(variance: Array) -> Array:
+    """Give the covariance of independent errors, Shape (n, n), from their variances, Shape (n,)."""
+    return np.diag(variance)
+
+
+@njit(cache=True)
+def of_noise(B: Array, variance: Array) -> Array:
+    """Give ``B diag(variance) B^T``: what independent noises do to a state.
+
+    Args:
+        B: Derivative of the state by the noises, Shape (n, m).
+        variance: Of each noise, Shape (m,).
+
+    Returns:
+        Shape (n, n).
+    """
+    B = np.ascontiguousarray(B)
+    return (B * variance) @ B.T
 
 
 @njit(cache=True)
@@ -59,17 +86,20 @@ def cholesky_solve(S: Array, B: Array) -> Array:
     Raises:
         LinAlgError: S is not positive definite.
     """
-    L = np.linalg.cholesky(np.ascontiguousarray(S))
-    X = B.copy()
-    n = len(L)
+    L, X = np.linalg.cholesky(np.ascontiguousarray(S)), B.copy()
+    n, m = X.shape
     for i in range(n):
         for j in range(i):
-            X[i] -= L[i, j] * X[j]
-        X[i] /= L[i, i]
+            for k in range(m):
+                X[i, k] -= L[i, j] * X[j, k]
+        for k in range(m):
+            X[i, k] /= L[i, i]
     for i in range(n - 1, -1, -1):
         for j in range(i + 1, n):
-            X[i] -= L[j, i] * X[j]
-        X[i] /= L[i, i]
+            for k in range(m):
+                X[i, k] -= L[j, i] * X[j, k]
+        for k in range(m):
+            X[i, k] /= L[i, i]
     return X
 
 

@@ -18,7 +18,10 @@ _TERMS = 8
 @njit(cache=True)
 def hat(v: Array) -> Array:
     """Give the skew matrix with ``hat(a) @ b = a x b``, Shape (3, 3)."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    out = np.zeros((3, 3))
+    out[0, 1], out[0, 2], out[1, 2] = -v[2], v[1], -v[0]
+    out[1, 0], out[2, 0], out[2, 1] = v[2], -v[1], v[0]
+    return out
 
 
 @njit(cache=True)
@@ -28,9 +31,11 @@ def small_adjoint(u: Array) -> Array:
     Reference:
         Barfoot, State Estimation for Robotics (2017), eq. 7.37.
     """
-    out = np.zeros((6, 6))
-    out[:3, :3] = out[3:, 3:] = hat(u[3:])
-    out[:3, 3:] = hat(u[:3])
+    out, turn, shift = np.zeros((6, 6)), hat(u[3:]), hat(u[:3])
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = out[3 + i, 3 + j] = turn[i, j]
+            out[i, 3 + j] = shift[i, j]
     return out
 
 
@@ -50,13 +55,34 @@ def step_jacobians(u: Array) -> tuple[Array, Array]:
     Reference:
         Barfoot (2017), eq. 7.47 and 7.75 (which has the left Jacobian).
     """
-    minus = -small_adjoint(u)
-    F, G, term = np.eye(6), np.eye(6), np.eye(6)
+    ad, term = small_adjoint(u), np.eye(6)
+    F, G = np.eye(6), np.eye(6)
     for n in range(1, _TERMS):
-        term = term @ minus / n
-        F += term
-        G += term / (n + 1)
+        term = _product(term, ad, -1.0 / n)
+        for i in range(6):
+            for j in range(6):
+                F[i, j] += term[i, j]
+                G[i, j] += term[i, j] / (n + 1)
     return F, G
+
+
+@njit(cache=True)
+def put(target: Array, row: int, column: int, block: Array) -> None:
+    """Copy a block into a matrix; one compiled function for every shape."""
+    for i in range(block.shape[0]):
+        for j in range(block.shape[1]):
+            target[row + i, column + j] = block[i, j]
+
+
+@njit(cache=True)
+def _product(A: Array, B: Array, factor: float) -> Array:
+    """Multiply small matrices and a factor; plain loops compile faster than they run slower."""
+    out = np.zeros(A.shape)
+    for i in range(len(A)):
+        for j in range(len(B)):
+            for k in range(B.shape[1]):
+                out[i, k] += factor * A[i, j] * B[j, k]
+    return out
 
 
 @njit(cache=True)

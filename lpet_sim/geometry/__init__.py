@@ -1,4 +1,4 @@
-"""Rotations, rigid motions and planar paths; numpy and scipy only."""
+"""Rotations, rigid motions and planar paths; numpy, scipy and numba only."""
 
 from lpet_sim.geometry.se3 import SE3
 
