@@ -28,7 +28,7 @@ class ErrorAttribution:
         contributions_m: Error vector of each cause [m]: ``scale`` (scale and noise of the
             encoders, track width), ``forced_slip``, ``slip`` (the wheels' own, along the wheel)
             and ``model`` (what remains with exact angles and no slip: sliding sideways, and the
-            way up and down that a wheel model does not know).
+            tilt of the ground, which wheels do not measure; it fills the vertical).
     """
 
     distance_m: float
