@@ -110,6 +110,7 @@ def _add_ground(spec: mujoco.MjSpec, patch: GroundPatch) -> None:
         pos=[*patch.centre_xy, patch.base_m],
         contype=1,
         conaffinity=2,
+        group=0,
     )
 
 
@@ -129,6 +130,7 @@ def _add_rock(spec: mujoco.MjSpec, rocks: RocksLike, k: int) -> None:
         pos=rocks.p_world_rock[k],
         contype=1,
         conaffinity=2,
+        group=0,
     )
 
 
