@@ -33,6 +33,7 @@ __all__ = ["draw_map", "draw_relief"]
 
 _HATCHES = ("", "////", "....", "xxxx", "----", "++++")
 _MAP_NODES = 700
+_PATCHES_MAX = 25.0
 _INK = "#2b1a14"
 _HATCH = "#4b6a88"
 
@@ -98,6 +99,9 @@ def _draw_soils(axes: Axes, terrain: Terrain, box: Box) -> list[Any]:
     soils = terrain.spec.soils
     if len(soils) < 2:
         return []
+    if box.x_max - box.x_min > _PATCHES_MAX * terrain.spec.soil_patch_m:
+        label = f"soils in patches of {terrain.spec.soil_patch_m:g} m: too fine to draw"
+        return [Patch(facecolor="none", edgecolor=_HATCH, hatch="////", label=label)]
     x, y = np.linspace(box.x_min, box.x_max, 300), np.linspace(box.y_min, box.y_max, 300)
     kind = terrain.soil(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)).reshape(300, 300)
     hatches = [_HATCHES[i % len(_HATCHES)] for i in range(len(soils))]

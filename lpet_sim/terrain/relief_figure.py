@@ -23,10 +23,11 @@ from lpet_sim.terrain.figure_ground import (
     sample_ground,
     save_figure,
 )
+from lpet_sim.terrain.rock_sizes import size_law
 from lpet_sim.terrain.terrain import Terrain
 
 _NODES = 260
-_DOTS_MAX = 4000
+_DOTS = 1500
 _RAY_STEPS = 160
 _ELEVATION_DEG, _AZIMUTH_DEG = 38.0, -60.0
 
@@ -53,7 +54,7 @@ def draw_relief(terrain: Terrain, box: Box, path: Path | str) -> None:
     count = _draw_dots(axes, terrain, box, ground, stretch)
     _dress_relief(axes, ground, stretch)
     figure.text(0.04, 0.95, f"{terrain.spec.name}: {count}; heights times {stretch:g}", size=11)
-    bar = figure.colorbar(colour_scale(ground), cax=figure.add_axes((0.91, 0.25, 0.018, 0.5)))
+    bar = figure.colorbar(colour_scale(ground), cax=figure.add_axes((0.895, 0.25, 0.018, 0.5)))
     bar.set_label("elevation [m]")
     save_figure(figure, path)
 
@@ -80,11 +81,10 @@ def _draw_block(axes: Axes3D, ground: Ground, colours: NDArray[np.float64]) -> N
 
 def _draw_dots(axes: Axes3D, terrain: Terrain, box: Box, ground: Ground, stretch: float) -> str:
     """Draw the largest rocks as dots, but for those behind a rise, and say how many."""
-    smallest = (box.x_max - box.x_min) / 400.0
-    rocks = terrain.rocks(box, smallest)
+    law = size_law(terrain.spec.rocks)
+    rocks = terrain.rocks(box, float(law.diameter_at(np.array([_DOTS / box.area_m2]))[0]))
     if len(rocks) == 0:
         return "no rocks"
-    rocks = rocks.select(np.argsort(-rocks.diameter_m, kind="stable")[:_DOTS_MAX])
     top = rocks.p_world_rock + np.outer(rocks.height_m, [0.0, 0.0, 1.0])
     seen = _is_seen(ground, top, stretch)
     size = np.clip(1.0 + 900.0 * (rocks.diameter_m / (box.x_max - box.x_min)), 1.0, 40.0)

@@ -23,7 +23,7 @@ class RockBin:
 
     Attributes:
         diameter_min_m: Lower limit, inside the range [m].
-        diameter_max_m: Upper limit, outside the range [m].
+        diameter_max_m: Upper limit, outside the range but for the last one [m].
         count: Rocks found.
         expected: Rocks that the size law gives on average.
     """
@@ -107,7 +107,7 @@ def _bin_edges(law: SizeLaw, area_m2: float) -> Array:
     most = np.array([_ROCKS_MAX / area_m2])
     low = max(law.diameter_min_m, float(law.diameter_at(most)[0]))
     inner = [edge for edge in _BIN_EDGES_M if low < edge < law.diameter_max_m]
-    return np.array([low, *inner, np.nextafter(law.diameter_max_m, np.inf)])
+    return np.array([low, *inner, law.diameter_max_m])
 
 
 def _metre_grid(terrain: Terrain, box: Box) -> Array:
