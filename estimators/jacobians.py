@@ -12,7 +12,7 @@ from numba import njit
 from lpet_sim.geometry.compiled import small_exp
 from lpet_sim.recording.arrays import Array
 
-_TERMS = 8
+_TERMS = 30
 
 
 @njit(cache=True)
@@ -43,8 +43,8 @@ def small_adjoint(u: Array) -> Array:
 def step_jacobians(u: Array) -> tuple[Array, Array]:
     """Give the derivatives of the next pose's error by the error before and by the step's.
 
-    ``Ad(exp(-u)) = sum (-ad u)^n / n!`` and ``J_r(u) = sum (-ad u)^n / (n + 1)!``, summed until the
-    terms are below 1e-9 for steps of up to 1 (a metre, a radian).
+    ``Ad(exp(-u)) = sum (-ad u)^n / n!`` and ``J_r(u) = sum (-ad u)^n / (n + 1)!``, summed until
+    nothing above 1e-15 is added.
 
     Args:
         u: Twist of the step, ``(translation, rotation)`` [m, rad], Shape (6,).
@@ -59,10 +59,14 @@ def step_jacobians(u: Array) -> tuple[Array, Array]:
     F, G = np.eye(6), np.eye(6)
     for n in range(1, _TERMS):
         term = _product(term, ad, -1.0 / n)
+        largest = 0.0
         for i in range(6):
             for j in range(6):
                 F[i, j] += term[i, j]
                 G[i, j] += term[i, j] / (n + 1)
+                largest = max(largest, abs(term[i, j]))
+        if largest < 1e-15:
+            break
     return F, G
 
 

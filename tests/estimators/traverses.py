@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimators.motion import integrate
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import NS_PER_S, Array
 from lpet_sim.recording.calibration import Calibration, PoseSpec, WheelCalibration
@@ -40,7 +41,7 @@ def calibration(start: SE3 | None = None, **more: object) -> Calibration:
     """Declare a suite; the start is the origin unless given."""
     known: dict[str, object] = {
         "wheels": wheel_calibration(),
-        "T_world_body_start": PoseSpec.from_se3(start or SE3.identity()),
+        "T_world_body_start": PoseSpec.from_se3(SE3.identity() if start is None else start),
         "gravity_mps2": GRAVITY_MPS2,
     }
     return Calibration.model_validate(known | more)
@@ -152,11 +153,8 @@ def _plan(rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def _chained(twists: Array) -> SE3:
-    steps = SE3.exp(twists)
-    poses = [SE3.from_rpy([0.05, -0.08, 0.3], [1.0, 2.0, 0.5])]
-    for k in range(len(twists)):
-        poses.append(poses[-1] @ steps[k])
-    return SE3.stack(poses)
+    """Chain the steps; the function is held to the product of exponentials by a test of its own."""
+    return integrate(SE3.from_rpy([0.05, -0.08, 0.3], [1.0, 2.0, 0.5]), twists)
 
 
 def _reported(moved: Array) -> WheelStream:
