@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from lpet_sim.progress import Progress, silent, track
-from lpet_sim.recording.kitti import read_kitti
+from lpet_sim.recording.kitti import import_kitti as read_kitti
+from lpet_sim.recording.recording import Recording
 from lpet_sim.recording.writer import RecordingWriter
 
 
@@ -21,8 +22,15 @@ def import_kitti(folder: Path, path: Path, progress: Progress = silent) -> None:
         RecordingError: The folder is not such a sequence.
         OutputError: The file cannot be written.
     """
-    manifest, calibration, images, truth = read_kitti(folder)
-    with RecordingWriter(path, manifest, calibration) as writer:
-        writer.log_truth(truth)
+    _write(read_kitti(folder), path, progress)
+
+
+def _write(recording: Recording, path: Path, progress: Progress) -> None:
+    """Write a recording whose images are read one pair at a time."""
+    measurements, images = recording.measurements, recording.measurements.images
+    assert images is not None
+    with RecordingWriter(path, recording.manifest, measurements.calibration) as writer:
+        if recording.truth is not None:
+            writer.log_truth(recording.truth)
         for index in track(range(len(images)), len(images), progress):
             writer.log_images(int(images.t_ns[index]), *images.pair(index))
