@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rich.table import Table
 from rich.text import Text
 
 from lpet_sim.evaluation.attribution import ErrorAttribution
+from lpet_sim.evaluation.errors import SegmentDrift
 from lpet_sim.evaluation.requirement import Requirement, Verdict, VerdictLine
 from lpet_sim.evaluation.result import RunResult
 
@@ -16,7 +17,7 @@ from lpet_sim.evaluation.result import RunResult
 def result_table(
     results: Sequence[RunResult], requirement: Requirement | None = None, title: str | None = None
 ) -> Table:
-    """Make a table with one row for each run, and its verdict.
+    """Make a table with one column for each run: its errors, and its verdict below them.
 
     Args:
         results: Scores.
@@ -25,23 +26,13 @@ def result_table(
     """
     requirement = requirement or Requirement()
     table = Table(title=Text(title) if title else None)
-    table.add_column("estimator")
-    for heading in (
-        "distance\n[m]",
-        "covered\n[%]",
-        "end error\n[m]",
-        "end error\n[% of dist.]",
-        f"worst after {requirement.start_m:g} m\n[% of dist.]",
-        "end roll, pitch, yaw\n[deg]",
-        "worst roll, pitch, yaw\n[deg]",
-        "NEES end\n[6 dof]",
-    ):
-        table.add_column(Text(heading), justify="right")
-    table.add_column("verdict", justify="center")
+    table.add_column("")
     for result in results:
-        table.add_row(
-            Text(result.name), *_row(result), _verdict_text(requirement.check(result), result)
-        )
+        table.add_column(Text(result.name), justify="right")
+    for heading, cell in _rows(requirement):
+        table.add_row(Text(heading), *(cell(result) for result in results))
+    verdicts = (_verdict_text(requirement.check(result), result) for result in results)
+    table.add_row("verdict", *verdicts)
     return table
 
 
@@ -59,21 +50,15 @@ def verdict_table(verdict: Verdict) -> Table:
 
 
 def segment_table(results: Sequence[RunResult]) -> Table:
-    """Make a table of the drift over segments, one row for each run and one column per length."""
+    """Make a table of the drift over segments, one column for each run and one row per length."""
     lengths = sorted({s.length_m for result in results for s in result.segments})
     table = Table(title=Text("Drift over segments: translation [%], rotation [deg/m]"))
-    table.add_column("estimator")
-    for length in lengths:
-        table.add_column(Text(f"{length:g} m"), justify="right")
+    table.add_column("length", justify="right")
     for result in results:
-        by_length = {s.length_m: s for s in result.segments}
-        cells = (
-            f"{by_length[n].translation_ratio:.3%}, {math.degrees(by_length[n].rotation_radpm):.4f}"
-            if n in by_length
-            else "-"
-            for n in lengths
-        )
-        table.add_row(Text(result.name), *cells)
+        table.add_column(Text(result.name), justify="right")
+    drifts = [{s.length_m: s for s in result.segments} for result in results]
+    for length in lengths:
+        table.add_row(f"{length:g} m", *(_drift(by_length.get(length)) for by_length in drifts))
     return table
 
 
@@ -100,18 +85,27 @@ def _verdict_text(verdict: Verdict, result: RunResult) -> Text:
     return text.append(f" ({result.failure})") if result.failure else text
 
 
-def _row(result: RunResult) -> list[str]:
-    nees = f"{result.nees_end['pose']:.2f}" if result.nees_end else "-"
+def _rows(requirement: Requirement) -> list[tuple[str, Callable[[RunResult], str]]]:
+    """Give the heading of each row with what makes its cells."""
     return [
-        f"{result.distance_m:.2f}",
-        f"{100 * result.completion:.1f}",
-        f"{math.hypot(*result.endpoint_error_m):.4f}",
-        f"{100 * result.endpoint_ratio:.3f}",
-        f"{100 * result.worst_ratio:.3f}",
-        _degrees(result.endpoint_attitude_rad, "+.3f"),
-        _degrees(result.worst_attitude_rad, ".3f"),
-        nees,
+        ("distance [m]", lambda r: f"{r.distance_m:.2f}"),
+        ("covered [%]", lambda r: f"{100 * r.completion:.1f}"),
+        ("end error [m]", lambda r: f"{math.hypot(*r.endpoint_error_m):.4f}"),
+        ("end error [% of dist.]", lambda r: f"{100 * r.endpoint_ratio:.3f}"),
+        (
+            f"worst after {requirement.start_m:g} m [% of dist.]",
+            lambda r: f"{100 * r.worst_ratio:.3f}",
+        ),
+        ("end roll, pitch, yaw [deg]", lambda r: _degrees(r.endpoint_attitude_rad, "+.2f")),
+        ("worst roll, pitch, yaw [deg]", lambda r: _degrees(r.worst_attitude_rad, ".2f")),
+        ("NEES at the end [6 dof]", lambda r: f"{r.nees_end['pose']:.2f}" if r.nees_end else "-"),
     ]
+
+
+def _drift(segment: SegmentDrift | None) -> str:
+    if segment is None:
+        return "-"
+    return f"{segment.translation_ratio:.3%}, {math.degrees(segment.rotation_radpm):.4f}"
 
 
 def _degrees(angles_rad: Sequence[float], form: str) -> str:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from itertools import pairwise
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
 import lpet_sim
 from lpet_sim.planning.clearance import RouteSpec
-from lpet_sim.planning.route import nearest_clear, plan_route
+from lpet_sim.planning.route import nearest_clear, plan_route_over
 from lpet_sim.recording.recording import Manifest
 from lpet_sim.rover.spec import DriveSpec, RoverSpec
 from lpet_sim.sensors.suite import SensorSuiteSpec
@@ -51,7 +50,8 @@ class TraverseSpec(Spec):
         name: What the traverse is called.
         terrain: The ground, or the name of a preset, or the path of a YAML file.
         rover: Which rover.
-        drive: Path, speed, stops and forced slips.
+        drive: Path, speed, stops and forced slips; a planned route brings its own rounding of
+            corners.
         route: How to plan a path among the rocks from the drive's first waypoint over the others
             to the last; None drives straight from waypoint to waypoint.
         move_within_m: How far, along x and y, a waypoint that is not clear of rocks may be moved
@@ -78,13 +78,13 @@ def planned_drive(spec: TraverseSpec, terrain: Terrain, seed: int) -> DriveSpec:
     """
     if spec.route is None:
         return spec.drive
-    corners = spec.drive.waypoints_m
+    route, corners = spec.route, spec.drive.waypoints_m
     if spec.move_within_m > 0:
-        corners = tuple(nearest_clear(terrain, c, spec.move_within_m, spec.route) for c in corners)
-    path = [corners[0]]
-    for start, goal in pairwise(corners):
-        path.extend(plan_route(terrain, start, goal, spec.route, seed)[1:])
-    return spec.drive.model_copy(update={"waypoints_m": tuple(path)})
+        corners = tuple(nearest_clear(terrain, c, spec.move_within_m, route) for c in corners)
+    path = plan_route_over(terrain, corners, route, seed)
+    # The route is clear of rocks only if it is driven with the rounding it was planned for.
+    rounding = {name: getattr(route, name) for name in ("corner_cut_m", "min_turn_radius_m")}
+    return spec.drive.model_copy(update={"waypoints_m": path, **rounding})
 
 
 def manifest_of(spec: TraverseSpec, drive: DriveSpec, seed: int) -> Manifest:

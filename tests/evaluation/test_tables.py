@@ -22,13 +22,13 @@ def _text(table: Table) -> str:
     return file.getvalue()
 
 
-def test_each_run_has_a_row_with_its_verdict_in_colour() -> None:
+def test_each_run_has_a_column_that_ends_in_its_verdict_in_colour() -> None:
     """Green for PASS, red for FAIL, and the failure by name."""
     truth = straight(20.0, 201)
     good = evaluate(as_estimate(scaled(truth, 1.005)), as_truth(truth))
     bad = evaluate(as_estimate(scaled(truth, 1.02)), as_truth(truth))
     table = result_table([good, bad, failed("broken")])
-    verdicts = list(table.columns[-1].cells)
+    verdicts = [list(column.cells)[-1] for column in table.columns[1:]]
     assert [str(verdict) for verdict in verdicts] == ["PASS", "FAIL", "FAIL (exception)"]
     assert [verdict.style for verdict in verdicts] == ["bold green", "bold red", "bold red"]
     assert len(_text(table).splitlines()) > 6
