@@ -49,10 +49,11 @@ def main() -> None:
 
 @contextmanager
 def _bar(title: str) -> Iterator[Progress]:
-    """Show a progress bar on stderr while the block runs."""
+    """Show a progress bar on stderr while the block runs; none where stderr is no terminal."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
     console = Console(stderr=True)
-    with ProgressBar(*columns, TimeElapsedColumn(), console=console) as bar:
+    hidden = not console.is_terminal
+    with ProgressBar(*columns, TimeElapsedColumn(), console=console, disable=hidden) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda fraction: bar.update(task, completed=fraction)
 

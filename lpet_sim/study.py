@@ -97,8 +97,8 @@ def draw_score(
 
 def _rocks_beside(spec: TraverseSpec, seed: int, score: Score) -> Array:
     xy = score.truth.trajectory.T_world_body.translation[:, :2]
-    corners = (*xy.min(axis=0), *xy.max(axis=0))
-    box = Box(*(float(x) for x in corners)).grown(_PLAN_MARGIN_M)
+    corners = (*(xy.min(axis=0) - _PLAN_MARGIN_M), *(xy.max(axis=0) + _PLAN_MARGIN_M))
+    box = Box(*(float(x) for x in corners))
     rocks = build_terrain(spec.terrain, seed).rocks(box, _PLAN_ROCK_MIN_M)
     return np.column_stack([rocks.p_world_rock[:, :2], rocks.diameter_m])
 

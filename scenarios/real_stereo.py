@@ -16,8 +16,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from estimators.frame_to_frame import FrameToFrame, FrameToFrameSpec
-from estimators.view_pair import TwoViewSpec
+from estimators.frame_to_frame import FrameToFrame
 from lpet_sim.datasets import data_folder
 from lpet_sim.evaluation import evaluate
 from lpet_sim.recording.estimate import Estimate
@@ -34,8 +33,7 @@ STARTS = (20, 30, 40)
 
 def frame_to_frame(recording: Recording, seed: int) -> Estimate:
     """Estimate with the defaults and one seed of the RANSAC."""
-    spec = FrameToFrameSpec(two_view=TwoViewSpec(ransac_seed=seed))
-    return FrameToFrame(spec).estimate(recording.measurements)
+    return FrameToFrame(ransac_seed=seed).estimate(recording.measurements)
 
 
 def libviso2(folder: Path, recording: Recording) -> Estimate | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from lpet_sim.outputs import output_folder
 from lpet_sim.progress import Progress, silent, track
 from lpet_sim.recording.kitti import import_kitti as read_kitti
 from lpet_sim.recording.recording import Recording
@@ -29,6 +30,7 @@ def _write(recording: Recording, path: Path, progress: Progress) -> None:
     """Write a recording whose images are read one pair at a time."""
     measurements, images = recording.measurements, recording.measurements.images
     assert images is not None
+    output_folder(path.parent)
     with RecordingWriter(path, recording.manifest, measurements.calibration) as writer:
         if recording.truth is not None:
             writer.log_truth(recording.truth)

@@ -76,8 +76,8 @@ def draw_ground(writer: RecordingWriter, terrain: Terrain, path_xy: Array) -> No
         terrain: The terrain.
         path_xy: Where the rover drives [m], Shape (n, 2).
     """
-    low, high = path_xy.min(axis=0), path_xy.max(axis=0)
-    box = Box(*(float(x) for x in (*low, *high))).grown(_MARGIN_M)
+    low, high = path_xy.min(axis=0) - _MARGIN_M, path_xy.max(axis=0) + _MARGIN_M
+    box = Box(*(float(x) for x in (*low, *high)))
     writer.draw_mesh("ground", ground_mesh(terrain, box))
     rocks = terrain.rocks(box, _ROCK_MIN_M * max(1.0, (box.area_m2 / 1000.0) ** 0.5))
     if len(rocks):

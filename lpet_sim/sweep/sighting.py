@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lpet_sim.errors import RecordingError
+from lpet_sim.outputs import output_folder
 from lpet_sim.progress import Progress, silent
 from lpet_sim.recording.overlay import add_sightings
 from lpet_sim.recording.reader import read_measurements
@@ -57,6 +58,7 @@ def sight_recording(
         RecordingError: The recording cannot be read, or holds no images or no stereo calibration.
         OutputError: The result cannot be written.
     """
+    output_folder(path_out.parent)
     measurements = read_measurements(path)
     measurements.require("images")
     if measurements.images is None or measurements.calibration.stereo is None:

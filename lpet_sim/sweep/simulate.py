@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lpet_sim.outputs import output_folder
 from lpet_sim.progress import Progress, silent
 from lpet_sim.recording.calibration import Calibration
 from lpet_sim.recording.truth import Truth
@@ -86,6 +87,7 @@ def simulate(spec: TraverseSpec, seed: int, path: Path, progress: Progress = sil
     Raises:
         LpetError: The spec cannot be driven, or the file cannot be written.
     """
+    output_folder(path.parent)
     world = build_world(spec, seed)
     pieces = drive(world.scene, world.drive)
     first = next(pieces)
