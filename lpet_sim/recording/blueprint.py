@@ -8,12 +8,17 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from lpet_sim.recording import layout
-from lpet_sim.recording.overview import Overview
+from lpet_sim.recording.overview import EstimateFacts, Overview
 
 _SKY = (38, 32, 30, 255)
 _UP = (0.0, 0.0, 1.0)
 _BACKDROP = (layout.TERRAIN, layout.LANDMARKS, layout.PATHS)
 _COUNTS = ("inliers", "matches", "bridged")
+
+# Of the window's height: the width of the right column, and the title of a view.
+_COLUMN_SHARE, _TITLE_SHARE = 0.75, 0.03
+_WIDE = 2.0
+_SLIP_RANGE = (-0.4, 1.1)
 
 Part = rrb.Container | rrb.View
 Vector = tuple[float, float, float]
@@ -21,9 +26,8 @@ Vector = tuple[float, float, float]
 
 def build_blueprint(overview: Overview) -> rrb.Blueprint:
     """Arrange the views: the world large, what it saw beside it, errors and slip below."""
-    columns = [column for column in (_left(overview), _right(overview)) if column is not None]
     return rrb.Blueprint(
-        rrb.Horizontal(*columns, column_shares=[3, 2][: len(columns)]),
+        rrb.Horizontal(_left(overview), _right(overview), column_shares=[5, 4]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline="time", play_state="following"),
@@ -34,7 +38,7 @@ def build_blueprint(overview: Overview) -> rrb.Blueprint:
 def _left(overview: Overview) -> rrb.Container:
     rows: list[Part] = [rrb.Tabs(_world(overview), _map(overview), _chase(overview))]
     for parts in (
-        [*_errors(overview), *_attitude(overview)],
+        [*_errors(overview), *_percent(overview)],
         [*_slip(overview), *_counts(overview)],
     ):
         if parts:
@@ -43,14 +47,26 @@ def _left(overview: Overview) -> rrb.Container:
 
 
 def _right(overview: Overview) -> rrb.Container:
-    rows: list[Part] = []
-    if overview.has_cameras and (overview.images or overview.sightings):
-        rows.append(_eye("left", "Left eye: landmarks and tracks"))
-        rows.append(_eye("right", "Right eye"))
+    rows = _eyes(overview)
+    attitude = [view for e in overview.estimates for view in _attitude(e, overview)]
+    if attitude:
+        rows.append((rrb.Tabs(*attitude), 0.2))
     text = rrb.TextDocumentView(origin=layout.SUMMARY, name="Summary")
     log = rrb.TextLogView(origin=layout.EVENT_LOG, name="Events")
-    rows.append(rrb.Tabs(text, log) if overview.has_events else text)
-    return rrb.Vertical(*rows, row_shares=[3, 3, 2][-len(rows) :])
+    left_over = max(0.2, 1.0 - sum(share for _, share in rows))
+    rows.append((rrb.Tabs(text, log) if overview.has_events else text, left_over))
+    return rrb.Vertical(*(part for part, _ in rows), row_shares=[share for _, share in rows])
+
+
+def _eyes(overview: Overview) -> list[tuple[Part, float]]:
+    """Put the eyes side by side, or wide ones one above the other, each with its share of rows."""
+    if overview.aspect is None or not (overview.images or overview.sightings):
+        return []
+    left, right = _eye("left", "Left eye: landmarks and tracks"), _eye("right", "Right eye")
+    if overview.aspect < _WIDE:
+        return [(rrb.Horizontal(left, right), _TITLE_SHARE + _COLUMN_SHARE / (2 * overview.aspect))]
+    share = _TITLE_SHARE + _COLUMN_SHARE / overview.aspect
+    return [(left, share), (right, share)]
 
 
 def _world(overview: Overview) -> rrb.View:
@@ -108,20 +124,24 @@ def _errors(overview: Overview) -> list[Part]:
     return _curves("Position error [m]", entities, overview)
 
 
-def _attitude(overview: Overview) -> list[Part]:
-    known = [e for e in overview.estimates if e.distance_m]
-    percent = [f"{layout.ERRORS}/{e.slug}/percent" for e in known]
-    views = _curves("Position error [% of distance]", percent, overview)
-    for e in known:
-        entity = f"{layout.ERRORS}/{e.slug}/attitude_deg"
-        views += _curves(f"Attitude error [deg]: {e.name}", [entity], overview)
-    return [rrb.Tabs(*views)] if views else []
+def _percent(overview: Overview) -> list[Part]:
+    entities = [f"{layout.ERRORS}/{e.slug}/percent" for e in overview.estimates if e.distance_m]
+    return _curves("Position error [% of distance]", entities, overview)
+
+
+def _attitude(estimate: EstimateFacts, overview: Overview) -> list[Part]:
+    if not estimate.distance_m:
+        return []
+    entity = f"{layout.ERRORS}/{estimate.slug}/attitude_deg"
+    return _curves(f"Attitude error [deg]: {estimate.name}", [entity], overview)
 
 
 def _slip(overview: Overview) -> list[Part]:
     if not overview.has_wheel_truth:
         return []
-    slip = _curves("True wheel slip", [f"{layout.TRUTH_WHEELS}/slip"], overview)
+    # A wheel that hardly turns has a slip of any size; what matters lies between these.
+    entity = f"{layout.TRUTH_WHEELS}/slip"
+    slip = _curves("True wheel slip", [entity], overview, rrb.ScalarAxis(range=_SLIP_RANGE))
     load = _curves("Wheel load [N]", [f"{layout.TRUTH_WHEELS}/load_n"], overview)
     return [rrb.Tabs(*slip, *load)]
 
@@ -136,7 +156,9 @@ def _counts(overview: Overview) -> list[Part]:
     return _curves("Inliers", entities, overview)
 
 
-def _curves(name: str, entities: list[str], overview: Overview) -> list[Part]:
+def _curves(
+    name: str, entities: list[str], overview: Overview, axis_y: rrb.ScalarAxis | None = None
+) -> list[Part]:
     """Plot curves over the whole traverse."""
     if not entities:
         return []
@@ -150,5 +172,6 @@ def _curves(name: str, entities: list[str], overview: Overview) -> list[Part]:
         name=name,
         plot_legend=rrb.PlotLegend("LeftTop"),
         axis_x=rrb.TimeAxis(view_range=whole),
+        axis_y=axis_y,
     )
     return [view]

@@ -28,6 +28,7 @@ from lpet_sim.recording.visuals import ESTIMATE_COLOURS, Pen
 
 # Before, the percentage of a distance near zero says nothing.
 FIRST_METRES_M = 5.0
+_LOWEST_LABEL_M = 2.5
 
 
 def add_sightings(
@@ -172,8 +173,9 @@ def _draw_estimate(pen: Pen, estimate: Estimate, facts: EstimateFacts, extent_m:
     entity = f"{layout.PATHS}/{facts.slug}"
     pen.path(f"{entity}/line", places, rgba, 2.0)
     pen.marker(f"{entity}/now", estimate.trajectory.t_ns, places, rgba)
-    # Ends lie close together; each label hangs on a pole of its own height.
-    pole = places[-1] + np.outer([0.0, 1.0], [0.0, 0.0, 0.06 * extent_m * (1 + facts.colour)])
+    # Ends lie close together; each label hangs on a pole of its own height, above the rover.
+    height_m = _LOWEST_LABEL_M + max(0.05 * extent_m, 0.4) * facts.colour
+    pole = places[-1] + np.outer([0.0, 1.0], [0.0, 0.0, height_m])
     pen.path(f"{entity}/pole", pole, rgba, 1.0)
     pen.labels(f"{entity}/end", pole[1:], [facts.label], rgba)
     for name in facts.diagnostics:

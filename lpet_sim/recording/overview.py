@@ -87,7 +87,7 @@ class Overview:
         has_truth: Whether there is a truth.
         has_wheel_truth: Whether slip and load are known.
         has_rover: Whether the rover moves in the drawing.
-        has_cameras: Whether there is a camera pair.
+        aspect: Width over height of an image, None without cameras.
         has_events: Whether something happened.
         images: Number of image pairs kept.
         sightings: Number of sightings.
@@ -101,7 +101,7 @@ class Overview:
     has_truth: bool = False
     has_wheel_truth: bool = False
     has_rover: bool = False
-    has_cameras: bool = False
+    aspect: float | None = None
     has_events: bool = False
     images: int = 0
     sightings: int = 0

@@ -50,7 +50,8 @@ class Sketch:
         """Draw the declared camera pair."""
         if self._stereo is not None:
             self._pen.cameras(self._stereo)
-            self.overview = replace(self.overview, has_cameras=True)
+            aspect = self._stereo.width_px / self._stereo.height_px
+            self.overview = replace(self.overview, aspect=aspect)
 
     def body(self, body: BodyTruth) -> None:
         """Move the rover along a piece of the truth."""
