@@ -11,12 +11,29 @@ from numpy.typing import NDArray
 
 from lpet_sim.geometry import SE3
 from lpet_sim.sensors.camera_spec import StereoCameraSpec
-from lpet_sim.sensors.ground_view import HAZE_M, GroundView
+from lpet_sim.sensors.ground_view import GroundView
 from lpet_sim.sensors.render_scene import Eye
-from lpet_sim.sensors.sky import HORIZON_RADIANCE, sky_coefficients, sky_radiance
+from lpet_sim.sensors.sky import sky_coefficients, sky_radiance
 from lpet_sim.terrain.terrain import Terrain
 
 Floats = NDArray[np.float32]
+
+
+def make_eyes(spec: StereoCameraSpec) -> tuple[Eye, Eye]:
+    """Make the left and the right pinhole camera as they truly are.
+
+    A disparity bias of the declared calibration is a shift of the right eye's true principal
+    point, ``u_right = declared - bias``, as a small turn of that eye would make it.
+    """
+    cx, cy = spec.principal_px
+    size = (spec.width_px, spec.height_px, spec.focal_px)
+    return Eye(*size, cx, cy), Eye(*size, cx - spec.declared_error.disparity_bias_px, cy)
+
+
+def place_eyes(spec: StereoCameraSpec, T_body_camera: SE3) -> tuple[SE3, SE3]:
+    """Give the poses of both eyes in the body; the spec's mount, if any, wins."""
+    left = T_body_camera if spec.mount is None else spec.mount.se3()
+    return left, left @ SE3(np.eye(3), np.array([spec.baseline_m, 0.0, 0.0]))
 
 
 class StereoRenderer:
@@ -35,13 +52,8 @@ class StereoRenderer:
             T_body_camera: Pose of the left eye in the body; the spec's mount, if any, wins.
         """
         self._spec = spec
-        mount = T_body_camera if spec.mount is None else spec.mount.se3()
-        self._T_body_eyes = (mount, mount @ SE3(np.eye(3), np.array([spec.baseline_m, 0.0, 0.0])))
-        cx, cy = spec.principal_px
-        biased = cx - spec.declared_error.disparity_bias_px
-        self._eyes = [
-            Eye(spec.width_px, spec.height_px, spec.focal_px, x, cy) for x in (cx, biased)
-        ]
+        self._T_body_eyes = place_eyes(spec, T_body_camera)
+        self._eyes = make_eyes(spec)
         self._view = GroundView(terrain, spec.ground, self._eyes)
         self._sky = sky_coefficients(terrain.spec.sun)
 
@@ -118,6 +130,3 @@ def _average(samples, step, R_world_camera, intrinsics, sky, out):  # type: igno
                     R_world_camera, (j - cx) / focal, (i - cy) / focal, sky
                 )
             out[i, j] = total * weight
-
-
-__all__ = ["HAZE_M", "HORIZON_RADIANCE", "StereoRenderer"]

@@ -38,7 +38,7 @@ class ImageChainSpec(Spec):
 
     blur_sigma_px: NotNegative = 0.5
     vignetting: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
-    white_radiance: Positive = 0.36
+    white_radiance: Positive = 0.55
     full_well_e: Positive = 170_000.0
     read_noise_e: NotNegative = 35.0
     photon_noise: bool = True
@@ -97,6 +97,16 @@ class GroundDetailSpec(Spec):
     ahead_m: NotNegative = 2.2
     supersampling: Literal[1, 2, 3] = 2
     rock_faces: Annotated[int, Field(ge=100, le=100_000)] = 24_000
+
+    @model_validator(mode="after")
+    def _cells_fit(self) -> Self:
+        cells = self.tile_texels * self.texel_m / self.cell_m
+        if abs(cells - round(cells)) > 1e-6 or round(cells) % 8 != 0 or round(cells) > 64:
+            raise ValueError(
+                "tile_texels * texel_m / cell_m, the cells along a tile, must be 8, 16, ... 64, "
+                f"not {cells:g}"
+            )
+        return self
 
 
 class StereoCameraSpec(Spec):
@@ -182,11 +192,14 @@ class StereoCameraSpec(Spec):
             T_body_camera: True pose of the left eye in the body, unless the spec has a mount.
         """
         true, error = self.true_calibration(T_body_camera), self.declared_error
-        turn = SE3.exp([0.0, 0.0, 0.0, *error.rotation_rad])
+        mount = true.T_body_camera
+        if any(error.rotation_rad):
+            turn = SE3.exp([0.0, 0.0, 0.0, *error.rotation_rad])
+            mount = PoseSpec.from_se3(mount.se3() @ turn)
         return true.model_copy(
             update={
                 "focal_px": true.focal_px * (1 + error.focal_scale_error),
                 "baseline_m": true.baseline_m * (1 + error.baseline_scale_error),
-                "T_body_camera": PoseSpec.from_se3(true.T_body_camera.se3() @ turn),
+                "T_body_camera": mount,
             }
         )

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.sensors.camera_spec import GroundDetailSpec
@@ -57,7 +58,7 @@ class Level:
 
 
 def make_levels(spec: GroundDetailSpec) -> tuple[Level, ...]:
-    """Lay out the levels: tiles double twice, then quadruple; cells are halved from the third on."""
+    """Lay out the levels: tiles double twice and then quadruple; far cells are twice as coarse."""
     cells = round(spec.tile_texels * spec.texel_m / spec.cell_m)
     rows: list[tuple[float, int, float, int]] = []
     tile_m = spec.tile_texels * spec.texel_m
@@ -81,7 +82,7 @@ def place_window(level: Level, xy: Array, current: tuple[int, int] | None) -> tu
     wish = xy / level.tile_m - TILES / 2
     if current is not None and np.all(np.abs(wish - current) <= _SLACK):
         return current
-    return int(math.floor(wish[0] + 0.5)), int(math.floor(wish[1] + 0.5))
+    return math.floor(wish[0] + 0.5), math.floor(wish[1] + 0.5)
 
 
 def active_box(level: Level, window: tuple[int, int]) -> Box:
@@ -148,7 +149,9 @@ def block_faces(cells: int) -> Ints:
     return np.stack([lower, upper], axis=1).reshape(-1, 3)
 
 
-def kept_cells(level: Level, tile: tuple[int, int], inside: Box, hole: Box | None) -> Array:
+def kept_cells(
+    level: Level, tile: tuple[int, int], inside: Box, hole: Box | None
+) -> NDArray[np.bool_]:
     """Tell which cells of a tile are drawn.
 
     Args:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,22 @@ from scipy.ndimage import gaussian_filter
 
 from lpet_sim.recording.arrays import Array
 from lpet_sim.sensors.clipmap import Level
-from lpet_sim.sensors.grain_kernels import add_grain, add_pebbles, stoniness_at
-from lpet_sim.sensors.shade_kernels import light_texels, raise_triangles, shadow_height
+from lpet_sim.sensors.grain_kernels import (
+    CRACK_M,
+    RIPPLE_M,
+    add_grain,
+    add_pebbles,
+    add_plates,
+    add_ripples,
+)
+from lpet_sim.sensors.shade_kernels import halve, light_texels, raise_triangles, shadow_height
 from lpet_sim.terrain.box import Box
 from lpet_sim.terrain.rocks import Rocks
 from lpet_sim.terrain.terrain import Terrain
 
 Floats = NDArray[np.float32]
 
-SKY_SHARE = 0.28
+SKY_SHARE = 0.25
 """Share of the light that comes from the dusty sky; about 0.3 at an optical depth of 0.5
 [recalled]."""
 
@@ -33,9 +41,34 @@ _MARGIN_CELLS = 72
 _FINE_MARGIN = 32
 _GRAIN_LONGEST_M = 0.064
 _GRAIN_OCTAVES = 4
-_GRAIN_STEEPNESS = 0.035
-_PEBBLES = ((0.08, 0.06), (0.04, 0.12), (0.02, 0.25), (0.01, 0.35))
-_SUN_WIDTH = 0.02
+_GRAIN_STEEPNESS = 0.085
+_PEBBLES = ((0.08, 0.07), (0.04, 0.22), (0.02, 0.6), (0.01, 1.0))
+_SUN_WIDTH_M = 0.02
+_ROCKS_TO_CELL_M = 0.5
+_DRAWN_ROCK_TONE = 0.65
+
+
+@dataclass(frozen=True)
+class _Coarse:
+    """Fields at a tile's coarse nodes, Shape (c, c): texel (i, j) is at ``(i + 0.5) / factor``.
+
+    Attributes:
+        factor: Texels to a coarse cell.
+        slope_x: dz/dx of what is drawn.
+        slope_y: dz/dy.
+        clearance: Height over the shadow [m].
+        open_sky: Share of the sky that is seen.
+        tone: Factor on the albedo, for the rocks that are drawn.
+        firm: Share of firm soil, with a rim as wide as the grain's.
+    """
+
+    factor: int
+    slope_x: Array
+    slope_y: Array
+    clearance: Array
+    open_sky: Array
+    tone: Array
+    firm: Array
 
 
 class GroundTexture:
@@ -64,68 +97,94 @@ class GroundTexture:
             Shape (texels, texels); row 0 is at the lowest y.
         """
         factor = max(1, round(_COARSE_M / level.texel_m))
-        slopes, clearance, open_sky = self._coarse(level, tile, factor, min_drawn_m)
-        fine, shade, tone = self._fine(level, tile)
+        coarse = self._coarse(level, tile, factor, min_drawn_m)
+        fine, shade, tone = self._fine(level, tile, coarse)
+        tan = math.tan(self.terrain.spec.sun.elevation_rad)
+        soft = np.array([tan * _SUN_WIDTH_M + 0.3 * level.texel_m, tan * level.texel_m])
         albedo = self._albedo(level, tile) * tone
-        tan = self._tan_elevation()
-        soft = np.array([tan * _SUN_WIDTH + 0.3 * level.texel_m, tan * level.texel_m])
-        return light_texels(
-            albedo, fine, shade, *slopes, clearance, open_sky, level.texel_m, float(factor),
-            self._sun, soft, SKY_SHARE,
-        )  # fmt: skip
-
-    def _tan_elevation(self) -> float:
-        return math.tan(self.terrain.spec.sun.elevation_rad)
+        fields = (coarse.slope_x, coarse.slope_y, coarse.clearance, coarse.open_sky, coarse.tone)
+        scale = (level.texel_m, float(factor))
+        return light_texels(albedo, fine, shade, *fields, *scale, self._sun, soft, SKY_SHARE)
 
     def _albedo(self, level: Level, tile: tuple[int, int]) -> Array:
         n = level.texels
         x = (tile[0] * n + np.arange(n) + 0.5) * level.texel_m
         y = (tile[1] * n + np.arange(n) + 0.5) * level.texel_m
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        return self.terrain.albedo(points, level.texel_m).reshape(n, n)
+        return self.terrain.albedo(points, level.texel_m, pebbles=False).reshape(n, n)
 
     def _coarse(
         self, level: Level, tile: tuple[int, int], factor: int, min_drawn_m: float
-    ) -> tuple[tuple[Array, Array], Array, Array]:
-        """Work out slopes, clearance over shadows and open sky at the tile's coarse nodes."""
+    ) -> _Coarse:
+        """Work out what the light needs at the tile's coarse nodes."""
         cell, n, m = level.texel_m * factor, level.texels // factor, _MARGIN_CELLS
         x0, y0 = tile[0] * n - m, tile[1] * n - m
         side = n + 2 * m + 2
-        ground = self.terrain.patch(x0, y0, (side, side), cell, cell / 2)
-        box = Box(x0 * cell, y0 * cell, (x0 + side) * cell, (y0 + side) * cell)
-        rocks = self.terrain.rocks(box, 1.5 * cell) if cell < 0.5 else None
-        tops = ground.copy()
-        if rocks is not None and len(rocks):
-            _raise(tops, rocks, rocks.diameter_m < min_drawn_m, (x0 * cell, y0 * cell), cell)
-            drawn = tops.copy()
-            _raise(tops, rocks, rocks.diameter_m >= min_drawn_m, (x0 * cell, y0 * cell), cell)
-        else:
-            drawn = ground
-        inner = slice(m, m + n + 2)
-        slope_y, slope_x = np.gradient(drawn[m - 1 : m + n + 3, m - 1 : m + n + 3], cell)
+        drawn = self.terrain.patch(x0, y0, (side, side), cell, cell / 2).copy()
+        firm = self._firm(x0, y0, side, cell)
+        if cell <= RIPPLE_M / 3:
+            add_ripples(drawn, 1.0 - firm, x0, y0, cell, self.key)
+        ground = tops = drawn
+        if cell <= _ROCKS_TO_CELL_M:
+            drawn, tops = self._with_rocks(drawn, (x0, y0), cell, min_drawn_m)
         shade = cast_shadows(tops, cell, self._sun)
-        covered = gaussian_filter(np.clip((tops - drawn) / (4 * cell), 0.0, 1.0), 2.0)
-        return (
-            (slope_x[1:-1, 1:-1].copy(), slope_y[1:-1, 1:-1].copy()),
-            (drawn - shade)[inner, inner].copy(),
-            (1.0 - 0.6 * covered)[inner, inner].copy(),
+        covered = np.clip((tops - drawn) / (4 * cell), 0.0, 1.0)
+        slope_y, slope_x = (np.asarray(slope) for slope in np.gradient(drawn, cell))
+        inner, rim = slice(m, m + n + 2), _FINE_MARGIN // factor
+        return _Coarse(
+            factor=factor,
+            slope_x=_square(slope_x, inner),
+            slope_y=_square(slope_y, inner),
+            clearance=_square(drawn - shade, inner),
+            open_sky=_square(1.0 - 0.6 * np.asarray(gaussian_filter(covered, 2.0)), inner),
+            tone=_square(np.where(drawn > ground, _DRAWN_ROCK_TONE, 1.0), inner),
+            firm=_square(firm, slice(m - rim, m + n + rim + 1)),
         )
 
-    def _fine(self, level: Level, tile: tuple[int, int]) -> tuple[Array, Array, Array]:
-        """Grow grain and pebbles: heights, their shadow heights and tone."""
+    def _firm(self, x0: int, y0: int, side: int, cell: float) -> Array:
+        """Give the share of firm soil at nodes, its borders softened."""
+        spec = self.terrain.spec
+        at = np.arange(side) * cell
+        points = np.stack(np.meshgrid(x0 * cell + at, y0 * cell + at), axis=-1).reshape(-1, 2)
+        firm = np.array([soil.firm for soil in spec.soils], dtype=float)
+        share = firm[self.terrain.soil(points)].reshape(side, side)
+        return np.asarray(gaussian_filter(share, 2.0))
+
+    def _with_rocks(
+        self, ground: Array, first: tuple[int, int], cell: float, min_drawn_m: float
+    ) -> tuple[Array, Array]:
+        """Raise the small rocks that are drawn, and then all that cast a shadow."""
+        x, y, side = first[0] * cell, first[1] * cell, len(ground) * cell
+        rocks = self.terrain.rocks(Box(x, y, x + side, y + side), 1.5 * cell)
+        drawn = ground.copy()
+        _raise(drawn, rocks, rocks.diameter_m < min_drawn_m, (x, y), cell)
+        tops = drawn.copy()
+        _raise(tops, rocks, rocks.diameter_m >= min_drawn_m, (x, y), cell)
+        return drawn, tops
+
+    def _fine(
+        self, level: Level, tile: tuple[int, int], coarse: _Coarse
+    ) -> tuple[Array, Array, Array]:
+        """Grow plates, grain and pebbles: heights, their shadow heights and tone."""
         n, texel, m = level.texels, level.texel_m, _FINE_MARGIN
         x0, y0 = tile[0] * n - m, tile[1] * n - m
         fine, tone = np.zeros((n + 2 * m, n + 2 * m)), np.ones((n + 2 * m, n + 2 * m))
         for octave in range(_GRAIN_OCTAVES):
-            wavelength = _GRAIN_LONGEST_M / 2**octave
-            if wavelength >= 2 * texel:
-                add_grain(fine, x0, y0, texel, wavelength, _GRAIN_STEEPNESS * wavelength, self.key)
+            wave = _GRAIN_LONGEST_M / 2**octave
+            if wave >= 2 * texel:
+                add_grain(fine, x0, y0, texel, wave, _GRAIN_STEEPNESS * wave, self.key)
+        if texel <= CRACK_M * 2:
+            add_plates(fine, tone, coarse.firm, coarse.factor, x0, y0, texel, self.key)
         for diameter, cover in _PEBBLES:
             if diameter >= 2 * texel:
                 add_pebbles(fine, tone, x0, y0, texel, diameter, cover, self.key)
         shade = cast_shadows(fine, texel, self._sun)
         rim, inner = slice(m - 1, m + n + 1), slice(m, m + n)
         return fine[rim, rim].copy(), shade[rim, rim].copy(), tone[inner, inner].copy()
+
+
+def _square(field: Array, part: slice) -> Array:
+    return np.ascontiguousarray(field[part, part])
 
 
 def cast_shadows(height: Array, cell_m: float, sun: Array) -> Array:
@@ -162,8 +221,6 @@ def _raise(
 
 def pyramid(tile: Floats) -> list[NDArray[np.uint16]]:
     """Give a tile and its halvings down to one texel as 16-bit numbers; 0 is kept for the sky."""
-    from lpet_sim.sensors.shade_kernels import halve
-
     levels = [tile]
     while len(levels[-1]) > 1:
         levels.append(halve(levels[-1]))

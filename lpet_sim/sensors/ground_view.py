@@ -29,6 +29,7 @@ _ROCK_MIN_TEXELS = 12.0
 _ATLAS = 2048
 _BLOCKS = TILES * TILES
 _VIEW_MARGIN_PX = 24.0
+_LOD_BIAS = 0.5
 
 
 @dataclass
@@ -58,7 +59,7 @@ class GroundView:
             (HORIZON_RADIANCE, HAZE_M),
         )
         for index, level in enumerate(self._levels):
-            self._scene.limit_halvings(index, int(np.log2(level.texels)))
+            self._scene.sharpen(index, int(np.log2(level.texels)), _LOD_BIAS)
         count = len(self._levels) * _BLOCKS + GROUPS
         self._low, self._high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
         self._origins = np.zeros((count, 3))

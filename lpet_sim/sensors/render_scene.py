@@ -147,11 +147,18 @@ class RenderScene:
         GL.glBindTexture(GL.GL_TEXTURE_2D, int(self._context.texture[index]))
         GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
 
-    def limit_halvings(self, index: int, halvings: int) -> None:
-        """Use a texture's first halvings only, as a tile is not to mix with its neighbours."""
+    def sharpen(self, index: int, halvings: int, bias: float) -> None:
+        """Set which of a texture's halvings are used.
+
+        Args:
+            index: The texture.
+            halvings: How many are filled.
+            bias: Steps finer than the coarser of a sample's two extents on the texture asks for.
+        """
         self._gl.make_current()
         self._bind(index)
         GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_MAX_LEVEL, halvings)
+        GL.glTexParameterf(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_LOD_BIAS, -bias)
 
     def upload_tile(
         self, index: int, column: int, row: int, images: Sequence[NDArray[np.uint16]]

@@ -9,11 +9,13 @@ from numba import njit
 
 from lpet_sim.terrain.hashing import tile_state, uniform
 
+_BELOW_GROUND_M = 0.02
+
 
 @njit(cache=True)
 def _solid_noise(key, x, y, z):  # type: ignore[no-untyped-def]
     """Interpolate hashed nodes of the unit lattice; values in -1..1."""
-    ix, iy, iz = int(math.floor(x)), int(math.floor(y)), int(math.floor(z))
+    ix, iy, iz = math.floor(x), math.floor(y), math.floor(z)
     fx, fy, fz = x - ix, y - iy, z - iz
     fx, fy = fx * fx * (3.0 - 2.0 * fx), fy * fy * (3.0 - 2.0 * fy)
     fz = fz * fz * (3.0 - 2.0 * fz)
@@ -30,9 +32,9 @@ def _solid_noise(key, x, y, z):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _grain(key, p, size):  # type: ignore[no-untyped-def]
-    """Sum three octaves of solid noise, the longest of wavelength ``size``."""
+    """Sum two octaves of solid noise, the longer of wavelength ``size``."""
     total = 0.0
-    for octave in range(3):
+    for octave in range(2):
         f = 2.0**octave / size
         total += 0.6**octave * _solid_noise(key + octave, p[0] * f, p[1] * f, p[2] * f)
     return total
@@ -64,7 +66,7 @@ def paint_rock(  # type: ignore[no-untyped-def]
     for k in range(corners.shape[0]):
         a, u, v = places[k, 0] * n, places[k, 1] * n, places[k, 2] * n
         area = (u[0] - a[0]) * (v[1] - a[1]) - (u[1] - a[1]) * (v[0] - a[0])
-        if abs(area) < 1e-9 or corners[k, :, 2].max() < -0.02:
+        if abs(area) < 1e-9 or corners[k, :, 2].max() < -_BELOW_GROUND_M:
             continue
         left = max(int(min(a[0], u[0], v[0]) - 1.5), 0)
         right = min(int(max(a[0], u[0], v[0]) + 1.5), n - 1)
@@ -82,6 +84,8 @@ def paint_rock(  # type: ignore[no-untyped-def]
                     continue
                 p = corners[k, 0] + s * (corners[k, 1] - corners[k, 0])
                 p = p + t * (corners[k, 2] - corners[k, 0])
+                if p[2] < -_BELOW_GROUND_M:
+                    continue
                 image[i, j] = albedo * _light(
                     p, normals[k], height, grain, rough, sun, ambient, key
                 )

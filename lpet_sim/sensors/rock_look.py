@@ -20,9 +20,10 @@ Floats = NDArray[np.float32]
 GROUPS = 16
 """Meshes that rocks are spread over, each a compact set, so that those out of view cost nothing."""
 
-_SMALLEST_IMAGE, _LARGEST_IMAGE = 8, 128
-_GRAIN_M = 0.05
+_SMALLEST_IMAGE, _LARGEST_IMAGE = 8, 256
+_GRAIN_M = 0.035
 _ROUGH = 0.10
+_UNDERSIDE = -0.5
 
 
 @dataclass(frozen=True)
@@ -98,10 +99,14 @@ class RockLook:
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         places = dome_places(corners - origin)[faces]
+        # Undersides fold over the dome's middle: they are left out, and tops are painted last.
+        order = np.argsort(normals[:, 2], kind="stable")
+        order = order[normals[order, 2] > _UNDERSIDE]
         diameter, height = float(rocks.diameter_m[row]), float(rocks.height_m[row])
         image = np.zeros((edge, edge))
         paint_rock(
-            image, triangles, places, normals, float(rocks.albedo[row]), height,
+            image, triangles[order], places[order], normals[order],
+            float(rocks.albedo[row]), height,
             min(_GRAIN_M, 0.4 * diameter), _ROUGH, self._sun, SKY_SHARE,
             (self._key + int(rocks.id[row])) & 0x7FFFFFFF,
         )  # fmt: skip
@@ -130,7 +135,7 @@ def dome_places(p: Array) -> Array:
 
 def _image_edge(diameter_m: float, texel_m: float) -> int:
     """Choose a power of two so that a texel on the rock is about one on the ground."""
-    wish = 1.5 * diameter_m / texel_m
+    wish = 2.0 * diameter_m / texel_m
     edge = 2 ** int(np.ceil(np.log2(max(wish, 1.0)) - 0.3))
     return int(min(max(edge, _SMALLEST_IMAGE), _LARGEST_IMAGE))
 
@@ -145,7 +150,8 @@ def pack(sizes: Sequence[int], atlas: int) -> list[tuple[int, int] | None]:
     Returns:
         Column and row of each; None where the atlas is full.
     """
-    unit, out, at = _SMALLEST_IMAGE, [], 0
+    unit, at = _SMALLEST_IMAGE, 0
+    out: list[tuple[int, int] | None] = []
     for size in sizes:
         step = (size // unit) ** 2
         if at + step > (atlas // unit) ** 2:

@@ -17,7 +17,7 @@ def shadow_height(height, shift, drop):  # type: ignore[no-untyped-def]
     """
     rows, columns = height.shape
     shade = np.full((rows, columns), -1e9)
-    whole = int(math.floor(shift))
+    whole = math.floor(shift)
     part = shift - whole
     for i in range(1, rows):
         for j in range(columns):
@@ -43,12 +43,12 @@ def raise_triangles(height, corners, x0, y0, cell):  # type: ignore[no-untyped-d
         left, right = corners[k, :, 0].min(), corners[k, :, 0].max()
         low, high = corners[k, :, 1].min(), corners[k, :, 1].max()
         for i in range(
-            max(int(math.ceil((low - y0) / cell)), 0),
-            min(int(math.floor((high - y0) / cell)), rows - 1) + 1,
+            max(math.ceil((low - y0) / cell), 0),
+            min(math.floor((high - y0) / cell), rows - 1) + 1,
         ):
             for j in range(
-                max(int(math.ceil((left - x0) / cell)), 0),
-                min(int(math.floor((right - x0) / cell)), columns - 1) + 1,
+                max(math.ceil((left - x0) / cell), 0),
+                min(math.floor((right - x0) / cell), columns - 1) + 1,
             ):
                 px, py = x0 + j * cell - ax, y0 + i * cell - ay
                 s = (px * vy - py * vx) / area
@@ -70,7 +70,19 @@ def _between(field, y, x):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def light_texels(  # type: ignore[no-untyped-def]
-    albedo, fine, fine_shade, slope_x, slope_y, clearance, open_sky, texel, factor, sun, soft, ambient
+    albedo,
+    fine,
+    fine_shade,
+    slope_x,
+    slope_y,
+    clearance,
+    open_sky,
+    tone,
+    texel,
+    factor,
+    sun,
+    soft,
+    ambient,
 ):
     """Light a tile: ``L = albedo (a_sky V (1 + n_z)/2 + (1 - a_sky) lit max(0, n . s))``.
 
@@ -85,6 +97,7 @@ def light_texels(  # type: ignore[no-untyped-def]
         slope_y: Likewise.
         clearance: Height over the coarse shadow [m], Shape (c, c).
         open_sky: Share of the sky that is seen, Shape (c, c).
+        tone: Factor on the albedo, Shape (c, c).
         texel: [m].
         factor: Texels to a coarse cell.
         sun: Unit vector to the sun, Shape (3,).
@@ -107,7 +120,8 @@ def light_texels(  # type: ignore[no-untyped-def]
             above = fine[i + 1, j + 1] - fine_shade[i + 1, j + 1]
             lit = min(lit, min(max(0.5 + above / soft[1], 0.0), 1.0))
             sky = 0.5 * ambient * _between(open_sky, y, x) * (1.0 + up)
-            out[i, j] = albedo[i, j] * (sky + (1.0 - ambient) * lit * facing)
+            light = albedo[i, j] * _between(tone, y, x)
+            out[i, j] = light * (sky + (1.0 - ambient) * lit * facing)
     return out
 
 

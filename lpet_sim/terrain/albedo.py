@@ -39,13 +39,14 @@ class AlbedoMap:
     pebbles: PebbleField
     tones: dict[int, Bands | None] = field(default_factory=dict)
 
-    def albedo(self, xy: Array, texel_m: float) -> Array:
+    def albedo(self, xy: Array, texel_m: float, pebbles: bool = True) -> Array:
         """Give the albedo at points [m], Shape (n, 2) -> (n,), without detail finer than texels."""
         relative = self.soils.tone(xy, texel_m)
         bands = self._bands(texel_m)
         if bands is not None:
             relative *= 1.0 + bands.height(xy)
-        self.pebbles.apply(xy, texel_m, relative)
+        if pebbles:
+            self.pebbles.apply(xy, texel_m, relative)
         relative *= self.spec.mean
         return np.clip(relative, DARKEST, BRIGHTEST, out=relative)
 
