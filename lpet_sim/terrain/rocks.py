@@ -46,8 +46,8 @@ BURIED_FRACTION = (0.4, 0.6)
 ALBEDO = (0.10, 0.24)
 """Range of a rock's albedo, from bare basalt to dust-coated [recalled]."""
 
-_ROCKS_KEPT = 200_000
-_TILES_KEPT = 50_000
+_ROCKS_KEPT = 100_000
+_TILES_KEPT = 20_000
 _TILE_MIN_M = 4.0
 _REACH_OVER_DIAMETER = 0.85
 _UNIFORMS = 7
@@ -86,20 +86,23 @@ class _Octave:
         side_m = spread * max(_TILE_MIN_M, 4.0 * largest_m, 1.6 * law.diameter_max_m)
         return cls((float(low), float(high)), side_m, _REACH_OVER_DIAMETER * largest_m)
 
-    def ground(self, i: int, j: int) -> Box:
-        """Give the box that a tile's rocks may have their centres in."""
-        low, high = -OVERFLOW * self.side_m, (1.0 + OVERFLOW) * self.side_m
-        x, y = i * self.side_m, j * self.side_m
-        return Box(x + low, y + low, x + high, y + high)
-
     def places(self, box: Box) -> list[tuple[int, int]]:
         """Name the tiles whose rocks may have their centres in a box."""
-        reached = box.grown(OVERFLOW * self.side_m)
-        rows = self._range(reached.y_min, reached.y_max)
-        return [(i, j) for j in rows for i in self._range(reached.x_min, reached.x_max)]
+        rows = self._range(box.y_min, box.y_max, 0.0)
+        return [(i, j) for j in rows for i in self._range(box.x_min, box.x_max, 0.0)]
 
-    def _range(self, low_m: float, high_m: float) -> range:
-        return range(math.floor(low_m / self.side_m), math.floor(high_m / self.side_m) + 1)
+    def near(self, smaller: _Octave, i: int, j: int) -> list[tuple[int, int]]:
+        """Name the tiles whose rocks may touch those of a tile of a smaller octave."""
+        margin_m = self.reach_m + smaller.reach_m + OVERFLOW * smaller.side_m
+        columns, rows = (
+            self._range(n * smaller.side_m, (n + 1) * smaller.side_m, margin_m) for n in (i, j)
+        )
+        return [(column, row) for row in rows for column in columns]
+
+    def _range(self, low_m: float, high_m: float, margin_m: float) -> range:
+        margin_m += OVERFLOW * self.side_m
+        first, last = (low_m - margin_m) / self.side_m, (high_m + margin_m) / self.side_m
+        return range(math.floor(first), math.floor(last) + 1)
 
 
 class RockField:
@@ -204,15 +207,14 @@ class RockField:
 
     def _obstacles(self, octave: int, i: int, j: int) -> Array:
         """Discs that a tile's rocks must keep clear of, Shape (m, 3)."""
-        own = self._octaves[octave]
         tiles = [
             self._tile(octave, *place)
             for place in [(i + di, j + dj) for dj in (-1, 0, 1) for di in (-1, 0, 1)]
             if _colour(*place) < _colour(i, j)
         ]
         for above in range(self._top, octave, -1):
-            near = own.ground(i, j).grown(own.reach_m + self._octaves[above].reach_m)
-            tiles += [self._tile(above, *place) for place in self._octaves[above].places(near)]
+            near = self._octaves[above].near(self._octaves[octave], i, j)
+            tiles += [self._tile(above, *place) for place in near]
         return np.concatenate([_EMPTY.discs, *(tile.discs for tile in tiles)])
 
     def _built(self, tiles: list[_Tile]) -> Rocks:
@@ -258,9 +260,9 @@ def _colour(i: int, j: int) -> int:
 
 
 def _identities(octave: int, i: int, j: int, count: int) -> Ints:
-    """Pack octave (5 bits), tile (2 x 20 bits) and rank (18 bits) into one positive integer."""
-    tile = ((octave + 16) << 40) | ((i + (1 << 19)) << 20) | (j + (1 << 19))
-    return (tile << 18) + np.arange(count, dtype=np.int64)
+    """Pack octave (5 bits), tile (2 x 18 bits) and rank (22 bits) into one positive integer."""
+    tile = ((octave + 16) << 36) | ((i + (1 << 17)) << 18) | (j + (1 << 17))
+    return (tile << 22) + np.arange(count, dtype=np.int64)
 
 
 def _taken(tile: _Tile, which: NDArray[np.bool_]) -> _Tile:
