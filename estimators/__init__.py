@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from estimators.dead_reckoning import DeadReckoning
+from estimators.frame_to_frame import FrameToFrame
 from estimators.fused_odometry import FusedOdometry
 from estimators.protocol import Estimator
 from lpet_sim.errors import UnknownNameError
@@ -12,6 +13,7 @@ from lpet_sim.errors import UnknownNameError
 ESTIMATORS: dict[str, Callable[[], Estimator]] = {
     "dead_reckoning": DeadReckoning,
     "fused_odometry": FusedOdometry,
+    "frame_to_frame": FrameToFrame,
 }
 """Every estimator by name, as a builder that takes the default spec."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from numba import njit
@@ -36,10 +37,12 @@ class DeadReckoning:
     Attributes:
         spec: How uneven the ground is.
         name: The name under which results are reported.
+        needs: The streams without which it cannot run.
     """
 
     spec: MotionSpec = field(default_factory=MotionSpec)
     name: str = "dead_reckoning"
+    needs: ClassVar[tuple[str, ...]] = ("wheels",)
 
     def estimate(self, measurements: Measurements) -> Estimate:
         """Chain the wheels' planar steps; see `Estimator`."""

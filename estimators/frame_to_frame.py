@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -63,11 +64,13 @@ class FrameToFrame:
         spec: Parameters.
         ransac_seed: Seed of the samples that RANSAC draws.
         name: The name under which results are reported.
+        needs: The streams without which it cannot run.
     """
 
     spec: FrameToFrameSpec = field(default_factory=FrameToFrameSpec)
     ransac_seed: int = 0
     name: str = "frame_to_frame"
+    needs: ClassVar[tuple[str, ...]] = ("sightings",)
 
     def estimate(self, measurements: Measurements) -> Estimate:
         """Chain the motions between images; see `Estimator`.

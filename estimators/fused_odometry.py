@@ -9,6 +9,7 @@ is held, the gyro reads its own bias and the accelerometer the direction of up.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -60,6 +61,7 @@ class FusedOdometry:
     Attributes:
         spec: Its parameters.
         name: The name under which results are reported.
+        needs: The streams without which it cannot run.
 
     Reference:
         Bakambu, Langley, Mukherji, figure 8 (block diagram of the IMU-fused 3D odometry).
@@ -67,6 +69,7 @@ class FusedOdometry:
 
     spec: FusedOdometrySpec = field(default_factory=FusedOdometrySpec)
     name: str = "fused_odometry"
+    needs: ClassVar[tuple[str, ...]] = ("wheels", "imu")
 
     def estimate(self, measurements: Measurements) -> Estimate:
         """Run the filter over wheel intervals; see `Estimator`."""

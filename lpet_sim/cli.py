@@ -106,17 +106,16 @@ def sight(
 def estimate(
     run: RecordingArgument,
     estimator: Annotated[
-        list[str] | None, typer.Option(help="Which estimator; may be given again. All if absent.")
+        list[str] | None,
+        typer.Option(help="Which one; may be given again. If absent, all that have their streams."),
     ] = None,
 ) -> None:
     """Run estimators on a recording and lay their estimates over it."""
-    from estimators import ESTIMATORS
     from lpet_sim.sweep.score import estimate_recording
 
-    names = tuple(estimator or ESTIMATORS)
     with _bar(f"estimating {run.name}") as progress:
-        estimate_recording(run, names, progress)
-    typer.echo(f"added {', '.join(names)}")
+        estimates = estimate_recording(run, estimator or None, progress)
+    typer.echo(f"added {', '.join(estimate.name for estimate in estimates)}")
     _wrote(run)
 
 

@@ -1,6 +1,6 @@
 """Drive a rover among rocks, localize it by every estimator, and score it: the demo as a script.
 
-    python scenarios/first_traverse.py --out out/first --seed 1 [--quick]
+python scenarios/first_traverse.py --out out/first --seed 1 [--quick]
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def quick(spec: TraverseSpec) -> TraverseSpec:
 
 def main() -> None:
     """Parse the command line and run."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=Path("out/first_traverse"))
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--quick", action="store_true", help="a few metres only")

@@ -8,6 +8,7 @@ Prints the resident memory each 100 m, and the real-time factor of the whole dri
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import time
 from pathlib import Path
@@ -32,17 +33,17 @@ class MemoryLog:
     def __init__(self, length_m: float) -> None:
         """Start at the start of a drive of the given length [m]."""
         self._length_m, self._began = length_m, time.perf_counter()
-        self.peaks_mb: list[float] = []
+        self.peaks_mb = [0.0]
 
     def note(self, fraction: float) -> None:
         """Look at the memory; print it when another 100 m are done."""
-        mark = min(int(fraction * self._length_m / _MARK_M), int(self._length_m / _MARK_M) - 1)
-        while len(self.peaks_mb) <= mark:
+        driven_m = fraction * self._length_m
+        mark = math.ceil(driven_m / _MARK_M)
+        if mark > len(self.peaks_mb):
             self.peaks_mb.append(0.0)
-        self.peaks_mb[mark] = max(self.peaks_mb[mark], resident_mb())
-        if fraction * self._length_m >= (mark + 1) * _MARK_M or fraction == 0:
             elapsed = time.perf_counter() - self._began
-            print(f"{fraction * self._length_m:7.1f} m {elapsed:7.1f} s {self.peaks_mb[mark]:8.1f} MB")
+            print(f"{driven_m:7.1f} m {elapsed:7.1f} s {resident_mb():8.1f} MB")
+        self.peaks_mb[-1] = max(self.peaks_mb[-1], resident_mb())
 
 
 def main() -> None:

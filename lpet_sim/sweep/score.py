@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from estimators import ESTIMATORS, build_estimator
+from estimators import ESTIMATORS, Estimator, build_estimator
 from estimators.dead_reckoning import DeadReckoning
 from lpet_sim.errors import RecordingError
 from lpet_sim.evaluation import RunResult, evaluate
@@ -17,7 +17,7 @@ from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.overlay import add_estimates
 from lpet_sim.recording.reader import read_estimates, read_recording
 from lpet_sim.recording.recording import Recording
-from lpet_sim.recording.streams import WheelStream
+from lpet_sim.recording.streams import Measurements, WheelStream
 from lpet_sim.recording.trajectory import Trajectory
 from lpet_sim.recording.truth import Truth
 
@@ -46,25 +46,43 @@ class Score:
 
 
 def estimate_recording(
-    path: Path, names: Sequence[str] = tuple(ESTIMATORS), progress: Progress = silent
+    path: Path, names: Sequence[str] | None = None, progress: Progress = silent
 ) -> tuple[Estimate, ...]:
     """Run estimators on a recording's measurements and lay their estimates over it.
 
     Args:
         path: The recording; it is replaced as a whole once all estimates are there.
-        names: Which estimators.
+        names: Which estimators; None for all that the recording has the streams for.
         progress: Called after each estimator.
 
     Raises:
         UnknownNameError: A name is not an estimator's.
         RecordingError: The recording cannot be read or lacks a stream.
     """
-    built = [build_estimator(name) for name in names]
+    asked = None if names is None else [build_estimator(name) for name in names]
     recording = read_recording(path)
     measurements = recording.measurements
+    built = _fed_by(measurements) if asked is None else asked
     estimates = tuple(e.estimate(measurements) for e in track(built, len(built), progress))
     add_estimates(path, [(estimate, _errors(estimate, recording)) for estimate in estimates])
     return estimates
+
+
+def _fed_by(measurements: Measurements) -> list[Estimator]:
+    """Build every estimator whose streams are there.
+
+    Raises:
+        RecordingError: There is none.
+    """
+    every = [build_estimator(name) for name in ESTIMATORS]
+    fed = [e for e in every if all(getattr(measurements, s) is not None for s in e.needs)]
+    if not fed:
+        needs = "; ".join(f"{e.name}: {', '.join(e.needs)}" for e in every)
+        raise RecordingError(
+            f"the recording has the streams of no estimator, they need ({needs}); "
+            "run 'lpet sight' first if it has images"
+        )
+    return fed
 
 
 def _errors(estimate: Estimate, recording: Recording) -> ErrorSeries | None:
