@@ -1,4 +1,4 @@
-"""The compiled loop of the fused odometry: an error-state filter over wheel intervals.
+"""The filter of the fused odometry: error states over wheel intervals, drives compiled.
 
 State of the error: ``xi`` 0:6 (right perturbation), gyro bias 6:9, accelerometer bias 9:12 (both
 in the body), scale of the wheels 12.
@@ -6,6 +6,9 @@ in the body), scale of the wheels 12.
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +22,7 @@ from lpet_sim.recording.arrays import Array
 
 SIZE = 13
 _START_SIGMA = 1e-6
+_REST_SIGMA = (1e-9, 1e-7)
 
 
 class Inputs(NamedTuple):
@@ -39,6 +43,11 @@ class Inputs(NamedTuple):
     moved: Array
     rolled: Array
     rest: NDArray[np.bool_]
+
+    def rows(self, rows: slice) -> Inputs:
+        """Cut some intervals out."""
+        dt, turns, speeds = self.dt[rows], self.turns[rows], self.speeds[rows]
+        return Inputs(dt, turns, speeds, self.moved[rows], self.rolled[rows], self.rest[rows])
 
 
 class Constants(NamedTuple):
@@ -152,13 +161,11 @@ def bias_drift(dt: float, c: Constants) -> Array:
     return out
 
 
-@njit(cache=True)
 def drift(P: Array, dt: float, c: Constants) -> Array:
     """Carry the covariance over one interval of rest: the biases walk, the pose is held."""
     return gaussian.with_noise(P, np.append(bias_drift(dt, c), 0.0))
 
 
-@njit(cache=True)
 def rest_jacobian(R: Array, up: Array) -> Array:
     """Give the derivative of (mean rate, mean specific force) at rest by the error, (6, 13).
 
@@ -172,19 +179,20 @@ def rest_jacobian(R: Array, up: Array) -> Array:
     return H
 
 
-@njit(cache=True)
 def rest_noise(duration: float, c: Constants) -> Array:
     """Give the covariance of (mean rate, mean force) over a rest, Shape (6, 6).
 
-    ``N^2/T`` each; the velocity is read at both ends with a variance of ``q^2/12``.
+    ``N^2/T`` each; the velocity is read at both ends with a variance of ``q^2/12``. A floor (in
+    rad/s and m/s^2) keeps the covariance positive definite for a unit that is declared perfect.
     """
     variance = np.empty(6)
-    variance[:3] = c.random_walk[0] ** 2 / duration
-    variance[3:] = c.random_walk[1] ** 2 / duration + c.quantum**2 / 6.0 / duration**2
+    rounding = c.quantum**2 / 6.0 / duration**2
+    for i in range(3):
+        variance[i] = c.random_walk[0] ** 2 / duration + _REST_SIGMA[0] ** 2
+        variance[3 + i] = c.random_walk[1] ** 2 / duration + rounding + _REST_SIGMA[1] ** 2
     return gaussian.independent(variance)
 
 
-@njit(cache=True)
 def run(R: Array, p: Array, data: Inputs, c: Constants) -> tuple[Array, Array, Array, Array]:
     """Filter a whole traverse.
 
@@ -200,29 +208,30 @@ def run(R: Array, p: Array, data: Inputs, c: Constants) -> tuple[Array, Array, A
     """
     n = len(data.dt)
     out_R, out_p, out_P = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3)), np.empty((n + 1, 6, 6))
-    rejected, bias = np.zeros(n + 1), np.zeros(7)
-    P = _start_covariance(c)
+    rejected, bias, P = np.zeros(n + 1), np.zeros(7), _start_covariance(c)
     out_R[0], out_p[0], out_P[0] = R, p, P[:6, :6]
-    held, mean = 0.0, np.zeros(6)
-    for k in range(n):
-        if data.rest[k]:
-            held += data.dt[k]
-            mean[:3] += data.turns[k]
-            mean[3:] += data.speeds[k]
-            P = drift(P, data.dt[k], c)
-            last = k + 1 == n or not data.rest[k + 1]
-            if last or held >= c.rest_block:
-                R, p, bias, P, rejected[k + 1] = _stand(R, p, bias, P, mean / held, held, c)
-                held, mean = 0.0, np.zeros(6)
+    for first, last in _pieces(data, c):
+        piece = data.rows(slice(first, last))
+        rows = slice(first + 1, last + 1)
+        if piece.rest[0]:
+            out_R[rows], out_p[rows], out_P[rows] = R, p, P[:6, :6]
+            R, p, bias, P, rejected[last] = _stand(R, p, bias, P, piece, c)
+            out_R[last], out_p[last], out_P[last] = R, p, P[:6, :6]
         else:
-            u = body_twist(data.turns[k], data.moved[k], data.dt[k], bias[:3], bias[6], c.contact)
-            P = predict(P, u, data.moved[k], data.rolled[k], data.dt[k], c)
-            R, p = _moved(R, p, u)
-        out_R[k + 1], out_p[k + 1], out_P[k + 1] = R, p, P[:6, :6]
+            out_R[rows], out_p[rows], out_P[rows], P = _drive(R, p, bias, P, piece, c)
+            R, p = out_R[last].copy(), out_p[last].copy()
     return out_R, out_p, out_P, rejected
 
 
-@njit(cache=True)
+def _pieces(data: Inputs, c: Constants) -> Iterator[tuple[int, int]]:
+    """Cut the intervals into drives and rests, long rests into blocks of equal length."""
+    changes = np.flatnonzero(np.diff(data.rest)) + 1
+    for first, last in itertools.pairwise([0, *changes.tolist(), len(data.dt)]):
+        blocks = math.ceil(data.dt[first:last].sum() / c.rest_block) if data.rest[first] else 1
+        cuts = np.linspace(first, last, min(blocks, last - first) + 1).round().astype(int)
+        yield from itertools.pairwise(cuts.tolist())
+
+
 def _start_covariance(c: Constants) -> Array:
     """The start is given: a micrometre and a microradian keep the covariance positive definite."""
     sigma = np.full(SIZE, _START_SIGMA)
@@ -231,22 +240,34 @@ def _start_covariance(c: Constants) -> Array:
 
 
 @njit(cache=True)
-def _moved(R: Array, p: Array, u: Array) -> tuple[Array, Array]:
-    step_R, step_p = se3_exp(u)
-    return R @ step_R, p + R @ step_p
+def _drive(
+    R: Array, p: Array, bias: Array, P: Array, data: Inputs, c: Constants
+) -> tuple[Array, Array, Array, Array]:
+    """Chain the twists of one drive; give every pose, its covariance, and the last whole one."""
+    n = len(data.dt)
+    out_R, out_p, out_P = np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, 6, 6))
+    for k in range(n):
+        u = body_twist(data.turns[k], data.moved[k], data.dt[k], bias[:3], bias[6], c.contact)
+        P = predict(P, u, data.moved[k], data.rolled[k], data.dt[k], c)
+        step_R, step_p = se3_exp(u)
+        p = p + R @ step_p
+        R = R @ step_R
+        out_R[k], out_p[k], out_P[k] = R, p, P[:6, :6]
+    return out_R, out_p, out_P, P
 
 
-@njit(cache=True)
 def _stand(
-    R: Array, p: Array, bias: Array, P: Array, mean: Array, duration: float, c: Constants
+    R: Array, p: Array, bias: Array, P: Array, data: Inputs, c: Constants
 ) -> tuple[Array, Array, Array, Array, float]:
-    """Take in a rest; leave everything as it is where the measurement does not fit."""
+    """Take in a rest; leave the state as it is where the measurement does not fit."""
+    duration = float(data.dt.sum())
+    P = drift(P, duration, c)
     H, cov = rest_jacobian(R, c.up), rest_noise(duration, c)
-    innovation = mean - bias[:6]
-    innovation[3:] -= R.T @ c.up
+    mean = np.concatenate([data.turns.sum(axis=0), data.speeds.sum(axis=0)]) / duration
+    innovation = mean - bias[:6] - np.concatenate([np.zeros(3), R.T @ c.up])
     S = gaussian.innovation_covariance(P, H, cov)
     if gaussian.normalised_square(innovation, S) > c.gate:
         return R, p, bias, P, 1.0
     dx, P = gaussian.update(P, H, innovation, cov)
-    R, p = _moved(R, p, dx[:6])
-    return R, p, bias + dx[6:], P, 0.0
+    step_R, step_p = se3_exp(dx[:6])
+    return R @ step_R, p + R @ step_p, bias + dx[6:], P, 0.0

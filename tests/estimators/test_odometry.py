@@ -154,6 +154,21 @@ def test_a_tilted_attitude_is_levelled_at_rest() -> None:
     assert after < 0.2 * before
 
 
+def test_a_unit_declared_perfect_breaks_nothing() -> None:
+    """No noise at all, no bias that walks: a rest still has a covariance."""
+    body = body_of(planar_arc(ticks(3001, 100.0), 0.0, 0.0, START), 0.0, 0.0)
+    imu, declared = sensed(body, ImuSpec.perfect())
+    still = np.zeros((601, 6))
+    wheels = WheelStream(ticks(601, 20.0), still, still.copy())
+    walks = {"gyro_bias_walk_radps_rts": 0.0, "accel_bias_walk_mps2_rts": 0.0}
+    perfect = FusedOdometry(FusedOdometry().spec.model_copy(update=walks))
+    estimate = perfect.estimate(Measurements(declared, imu=imu, wheels=wheels))
+    assert estimate.diagnostics["rest_rejected"].sum() == 0
+    np.testing.assert_allclose(
+        estimate.trajectory.T_world_body.matrix(), np.tile(START.matrix(), (601, 1, 1)), atol=1e-9
+    )
+
+
 def test_every_covariance_is_positive_definite() -> None:
     """From the very first pose."""
     _, measurements = noisy_measurements(1)
