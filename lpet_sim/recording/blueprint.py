@@ -12,12 +12,14 @@ from lpet_sim.recording.overview import EstimateFacts, Overview
 
 _SKY = (38, 32, 30, 255)
 _UP = (0.0, 0.0, 1.0)
-_BACKDROP = (layout.TERRAIN, layout.LANDMARKS, layout.PATHS)
+_BACKDROP = (layout.TERRAIN, layout.LANDMARKS, layout.PATHS, layout.EVENT_PLACES)
 _COUNTS = ("inliers", "matches", "bridged")
 
 # Of the window's height: the width of the right column, and the title of a view.
 _COLUMN_SHARE, _TITLE_SHARE = 0.75, 0.03
 _WIDE = 2.0
+# Room for the labels over the ends of the paths [m].
+_ABOVE = (0.0, 0.0, 3.0)
 _SLIP_RANGE = (-0.4, 1.1)
 
 Part = rrb.Container | rrb.View
@@ -36,7 +38,7 @@ def build_blueprint(overview: Overview) -> rrb.Blueprint:
 
 
 def _left(overview: Overview) -> rrb.Container:
-    rows: list[Part] = [rrb.Tabs(_world(overview), _map(overview), _chase(overview))]
+    rows: list[Part] = [rrb.Tabs(_world(overview), _map(overview), _ride())]
     for parts in (
         [*_errors(overview), *_percent(overview)],
         [*_slip(overview), *_counts(overview)],
@@ -50,7 +52,7 @@ def _right(overview: Overview) -> rrb.Container:
     rows = _eyes(overview)
     attitude = [view for e in overview.estimates for view in _attitude(e, overview)]
     if attitude:
-        rows.append((rrb.Tabs(*attitude), 0.2))
+        rows.append((rrb.Tabs(*attitude, active_tab=len(attitude) - 1), 0.2))
     text = rrb.TextDocumentView(origin=layout.SUMMARY, name="Summary")
     log = rrb.TextLogView(origin=layout.EVENT_LOG, name="Events")
     left_over = max(0.2, 1.0 - sum(share for _, share in rows))
@@ -80,28 +82,26 @@ def _map(overview: Overview) -> rrb.View:
     return _view_3d("From above", overview, (0.0, -0.01, 1.1), (0.0, 1.0, 0.0))
 
 
-def _chase(overview: Overview) -> rrb.View:
-    start = np.array(overview.low_m or (0.0, 0.0, 0.0))
-    position = start + np.array([-4.0, -4.0, 3.0])
-    eye = rrb.EyeControls3D(
-        position=position, look_target=start, tracking_entity=layout.ROVER, eye_up=_UP
-    )
-    return _spatial("With the rover", eye)
+def _ride() -> rrb.View:
+    # In the rover's own frame an eye that stands still goes along with it.
+    eye = rrb.EyeControls3D(position=(-3.0, -3.5, 2.2), look_target=(0.5, 0.0, 0.3), eye_up=_UP)
+    return _spatial("With the rover", eye, layout.ROVER)
 
 
 def _view_3d(name: str, overview: Overview, direction: Vector, up: Vector) -> rrb.View:
     """Look at the middle of the traverse from a direction, so far away that all of it is seen."""
     if not overview.low_m:
         return _spatial(name, None)
-    low, high = np.array(overview.low_m), np.array(overview.high_m)
+    low, high = np.array(overview.low_m), np.array(overview.high_m) + _ABOVE
     centre, size = (low + high) / 2, max(float(np.linalg.norm(high - low)), 4.0)
-    position = centre + 0.9 * size * np.array(direction)
+    position = centre + 1.05 * size * np.array(direction)
     return _spatial(name, rrb.EyeControls3D(position=position, look_target=centre, eye_up=up))
 
 
-def _spatial(name: str, eye: rrb.EyeControls3D | None) -> rrb.View:
+def _spatial(name: str, eye: rrb.EyeControls3D | None, origin: str = layout.WORLD) -> rrb.View:
     return rrb.Spatial3DView(
-        origin="/world",
+        origin=origin,
+        contents=f"{layout.WORLD}/**",
         name=name,
         background=_SKY,
         line_grid=False,

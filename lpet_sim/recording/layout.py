@@ -20,6 +20,7 @@ EVENT_LOG = "/events"
 ESTIMATES = "/estimates"
 ERRORS = "/errors"
 
+WORLD = "/world"
 ROVER = "/world/rover"
 CAMERAS = {"left": "/world/rover/camera", "right": "/world/rover/camera_right"}
 TERRAIN = "/world/terrain"

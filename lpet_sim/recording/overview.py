@@ -62,7 +62,8 @@ class EstimateFacts:
         """The name with the end error where it is known."""
         if self.end_error_m is None or not self.distance_m:
             return self.name
-        return f"{self.name}: {self.end_error_m:.2f} m, {self._percent():.2f} %"
+        digits = 2 if self.end_error_m >= 0.1 else 3
+        return f"{self.name}: {self.end_error_m:.{digits}f} m, {self._percent():.2f} %"
 
     def row(self) -> str:
         """Give the estimate's row of the table."""
@@ -189,7 +190,7 @@ def estimate_facts(
 
 
 def _specs(manifest: Manifest) -> list[str]:
-    lines = ["## Specs", ""]
+    lines = ["## Specs", ""] if manifest.specs else []
     for name, spec in manifest.specs.items():
         lines += [f"**{name}**", "", "```yaml", *_flat(spec), "```", ""]
     versions = ", ".join(f"{name} {version}" for name, version in manifest.versions.items())

@@ -22,6 +22,7 @@ from lpet_sim.errors import RecordingError
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEADER = ">IIBBBBB"
 _UP = 2
+_SENSOR_BITS = 12
 _DEPTHS: dict[int, np.dtype[Any]] = {8: np.dtype(np.uint8), 16: np.dtype(">u2")}
 
 
@@ -29,7 +30,8 @@ def encode_png(image: NDArray[Any]) -> bytes:
     """Encode a grey image without loss.
 
     Args:
-        image: Shape (h, w), uint8 or uint16 (where 12-bit cameras go, values unscaled).
+        image: Shape (h, w), uint8 or uint16; values of 12 bits are moved up, so that a viewer
+            does not show them black, and moved back on reading, as the chunk sBIT says.
 
     Raises:
         RecordingError: Another shape or type.
@@ -40,9 +42,12 @@ def encode_png(image: NDArray[Any]) -> bytes:
             "valid are grey images of shape (h, w), uint8 or uint16"
         )
     depth = 8 * image.dtype.itemsize
+    bits = _SENSOR_BITS if depth == 16 and image.max() < 1 << _SENSOR_BITS else depth
     header = struct.pack(_HEADER, image.shape[1], image.shape[0], depth, 0, 0, 0, 0)
-    body = _deflate(_filter_up(image.astype(_DEPTHS[depth], order="C")))
-    return _SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", body) + _chunk(b"IEND", b"")
+    meaning = _chunk(b"sBIT", bytes([bits])) if bits < depth else b""
+    body = _deflate(_filter_up((image << (depth - bits)).astype(_DEPTHS[depth], order="C")))
+    head = _SIGNATURE + _chunk(b"IHDR", header) + meaning
+    return head + _chunk(b"IDAT", body) + _chunk(b"IEND", b"")
 
 
 def decode_png(data: bytes | memoryview) -> NDArray[Any]:
@@ -81,14 +86,18 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def _decode(data: bytes) -> NDArray[Any]:
-    if data[:8] != _SIGNATURE or data[12:16] != b"IHDR" or data[37:41] != b"IDAT":
-        raise ValueError("not a PNG of this layout")
+    if data[:8] != _SIGNATURE or data[12:16] != b"IHDR":
+        raise ValueError("not a PNG")
     width, height, depth = struct.unpack_from(">IIB", data, 16)
-    (length,) = struct.unpack_from(">I", data, 33)
+    shift = depth - data[41] if data[37:41] == b"sBIT" else 0
+    start = 46 if shift else 33
+    length, name = struct.unpack_from(">I4s", data, start)
+    if name != b"IDAT":
+        raise ValueError("not a PNG of this layout")
     kind = _DEPTHS[depth]
-    rows = np.frombuffer(zlib.decompress(data[41 : 41 + length]), dtype=np.uint8)
+    rows = np.frombuffer(zlib.decompress(data[start + 8 : start + 8 + length]), dtype=np.uint8)
     rows = rows.reshape(height, width * kind.itemsize + 1)
     if np.any(rows[:, 0] != _UP):
         raise ValueError("a row has another filter than Up")
     pixels = np.add.accumulate(rows[:, 1:], axis=0, dtype=np.uint8)
-    return pixels.view(kind).astype(kind.newbyteorder("="), copy=False)
+    return pixels.view(kind).astype(kind.newbyteorder("="), copy=False) >> shift

@@ -54,7 +54,7 @@ class Pen:
         """Set the world up: z is up, and the camera pair stands on the rover."""
         self._stream = stream
         self._styled: set[str] = set()
-        self._static("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        self._static(layout.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
 
     def mesh(self, entity: str, mesh: Mesh) -> None:
         """Draw a mesh that does not change."""
