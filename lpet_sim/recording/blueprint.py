@@ -133,7 +133,7 @@ def _attitude(estimate: EstimateFacts, overview: Overview) -> list[Part]:
     if not estimate.distance_m:
         return []
     entity = f"{layout.ERRORS}/{estimate.slug}/attitude_deg"
-    return _curves(f"Attitude error [deg]: {estimate.name}", [entity], overview)
+    return _curves(f"Attitude [deg]: {estimate.name}", [entity], overview)
 
 
 def _slip(overview: Overview) -> list[Part]:

@@ -174,7 +174,7 @@ def _draw_estimate(pen: Pen, estimate: Estimate, facts: EstimateFacts, extent_m:
     pen.path(f"{entity}/line", places, rgba, 2.0)
     pen.marker(f"{entity}/now", estimate.trajectory.t_ns, places, rgba)
     # Ends lie close together; each label hangs on a pole of its own height, above the rover.
-    height_m = _LOWEST_LABEL_M + max(0.05 * extent_m, 0.4) * facts.colour
+    height_m = _LOWEST_LABEL_M + max(0.06 * extent_m, 0.9) * facts.colour
     pole = places[-1] + np.outer([0.0, 1.0], [0.0, 0.0, height_m])
     pen.path(f"{entity}/pole", pole, rgba, 1.0)
     pen.labels(f"{entity}/end", pole[1:], [facts.label], rgba)
