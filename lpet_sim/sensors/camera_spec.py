@@ -96,7 +96,7 @@ class GroundDetailSpec(Spec):
     levels: Annotated[int, Field(ge=1, le=8)] = 8
     ahead_m: NotNegative = 2.2
     supersampling: Literal[1, 2, 3] = 2
-    rock_faces: Annotated[int, Field(ge=100, le=100_000)] = 24_000
+    rock_faces: Annotated[int, Field(ge=100, le=400_000)] = 112_000
 
     @model_validator(mode="after")
     def _cells_fit(self) -> Self:

@@ -37,7 +37,9 @@ SKY_SHARE = 0.25
 [recalled]."""
 
 _COARSE_M = 0.025
-_MARGIN_CELLS = 72
+_SHADOW_CELLS = 72
+_RIM_CELLS = 10
+_ROCK_REACH_M = 1.0
 _FINE_MARGIN = 32
 _GRAIN_LONGEST_M = 0.064
 _GRAIN_OCTAVES = 4
@@ -71,6 +73,26 @@ class _Coarse:
     firm: Array
 
 
+@dataclass(frozen=True)
+class _Grid:
+    """Nodes ``(x0 + j, y0 + i) cell_m`` of some rows and columns."""
+
+    x0: int
+    y0: int
+    shape: tuple[int, int]
+    cell_m: float
+
+    @property
+    def box(self) -> Box:
+        x, y = self.x0 * self.cell_m, self.y0 * self.cell_m
+        return Box(x, y, x + self.shape[1] * self.cell_m, y + self.shape[0] * self.cell_m)
+
+    def window(self, tile: tuple[int, int], n: int, before: int, after: int) -> tuple[slice, slice]:
+        """Pick a tile's nodes with some before and after them."""
+        i, j = tile[1] * n - self.y0, tile[0] * n - self.x0
+        return slice(i - before, i + n + after), slice(j - before, j + n + after)
+
+
 class GroundTexture:
     """Bakes tiles of radiance.
 
@@ -96,7 +118,7 @@ class GroundTexture:
         Returns:
             Shape (texels, texels); row 0 is at the lowest y.
         """
-        factor = max(1, round(_COARSE_M / level.texel_m))
+        factor = max(2, round(_COARSE_M / level.texel_m))
         coarse = self._coarse(level, tile, factor, min_drawn_m)
         fine, shade, tone = self._fine(level, tile, coarse)
         tan = math.tan(self.terrain.spec.sun.elevation_rad)
@@ -117,49 +139,57 @@ class GroundTexture:
         self, level: Level, tile: tuple[int, int], factor: int, min_drawn_m: float
     ) -> _Coarse:
         """Work out what the light needs at the tile's coarse nodes."""
-        cell, n, m = level.texel_m * factor, level.texels // factor, _MARGIN_CELLS
-        x0, y0 = tile[0] * n - m, tile[1] * n - m
-        side = n + 2 * m + 2
-        drawn = self.terrain.patch(x0, y0, (side, side), cell, cell / 2).copy()
-        firm = self._firm(x0, y0, side, cell)
-        if cell <= RIPPLE_M / 3:
-            add_ripples(drawn, 1.0 - firm, x0, y0, cell, self.key)
+        n, rim = level.texels // factor, _FINE_MARGIN // factor
+        grid = self._grid(tile, n, level.texel_m * factor, rim)
+        drawn = self.terrain.patch(grid.x0, grid.y0, grid.shape, grid.cell_m, grid.cell_m / 2)
+        firm = self._firm(grid)
+        if grid.cell_m <= RIPPLE_M / 3:
+            drawn = drawn.copy()
+            add_ripples(drawn, 1.0 - firm, grid.x0, grid.y0, grid.cell_m, self.key)
         ground = tops = drawn
-        if cell <= _ROCKS_TO_CELL_M:
-            drawn, tops = self._with_rocks(drawn, (x0, y0), cell, min_drawn_m)
-        shade = cast_shadows(tops, cell, self._sun)
-        covered = np.clip((tops - drawn) / (4 * cell), 0.0, 1.0)
-        slope_y, slope_x = (np.asarray(slope) for slope in np.gradient(drawn, cell))
-        inner, rim = slice(m, m + n + 2), _FINE_MARGIN // factor
+        if grid.cell_m <= _ROCKS_TO_CELL_M:
+            drawn, tops = self._with_rocks(drawn, grid, min_drawn_m)
+        shade = cast_shadows(tops, grid.cell_m, self._sun)
+        covered = np.clip((tops - drawn) / (4 * grid.cell_m), 0.0, 1.0)
+        slope_y, slope_x = (np.asarray(slope) for slope in np.gradient(drawn, grid.cell_m))
+        inner = grid.window(tile, n, 0, 2)
         return _Coarse(
             factor=factor,
-            slope_x=_square(slope_x, inner),
-            slope_y=_square(slope_y, inner),
-            clearance=_square(drawn - shade, inner),
-            open_sky=_square(1.0 - 0.6 * np.asarray(gaussian_filter(covered, 2.0)), inner),
-            tone=_square(np.where(drawn > ground, _DRAWN_ROCK_TONE, 1.0), inner),
-            firm=_square(firm, slice(m - rim, m + n + rim + 1)),
+            slope_x=np.ascontiguousarray(slope_x[inner]),
+            slope_y=np.ascontiguousarray(slope_y[inner]),
+            clearance=np.ascontiguousarray((drawn - shade)[inner]),
+            open_sky=1.0 - 0.6 * np.asarray(gaussian_filter(covered, 2.0)[inner]),
+            tone=np.ascontiguousarray(np.where(drawn > ground, _DRAWN_ROCK_TONE, 1.0)[inner]),
+            firm=np.ascontiguousarray(firm[grid.window(tile, n, rim, rim + 1)]),
         )
 
-    def _firm(self, x0: int, y0: int, side: int, cell: float) -> Array:
+    def _grid(self, tile: tuple[int, int], n: int, cell_m: float, rim: int) -> _Grid:
+        """Lay nodes over a tile and as far towards the sun as its shadows come from."""
+        lead = max(abs(self._sun[0]), abs(self._sun[1]), 1e-9)
+        least = max(_RIM_CELLS, rim + 2)
+        low, high = [least, least], [least, least]
+        for axis in (0, 1):
+            reach = least + math.ceil(_SHADOW_CELLS * abs(self._sun[axis]) / lead)
+            (high if self._sun[axis] > 0 else low)[axis] = reach
+        shape = (n + 2 + low[1] + high[1], n + 2 + low[0] + high[0])
+        return _Grid(tile[0] * n - low[0], tile[1] * n - low[1], shape, cell_m)
+
+    def _firm(self, grid: _Grid) -> Array:
         """Give the share of firm soil at nodes, its borders softened."""
-        spec = self.terrain.spec
-        at = np.arange(side) * cell
-        points = np.stack(np.meshgrid(x0 * cell + at, y0 * cell + at), axis=-1).reshape(-1, 2)
-        firm = np.array([soil.firm for soil in spec.soils], dtype=float)
-        share = firm[self.terrain.soil(points)].reshape(side, side)
+        x = (grid.x0 + np.arange(grid.shape[1])) * grid.cell_m
+        y = (grid.y0 + np.arange(grid.shape[0])) * grid.cell_m
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        firm = np.array([soil.firm for soil in self.terrain.spec.soils], dtype=float)
+        share = firm[self.terrain.soil(points)].reshape(grid.shape)
         return np.asarray(gaussian_filter(share, 2.0))
 
-    def _with_rocks(
-        self, ground: Array, first: tuple[int, int], cell: float, min_drawn_m: float
-    ) -> tuple[Array, Array]:
+    def _with_rocks(self, ground: Array, grid: _Grid, min_drawn_m: float) -> tuple[Array, Array]:
         """Raise the small rocks that are drawn, and then all that cast a shadow."""
-        x, y, side = first[0] * cell, first[1] * cell, len(ground) * cell
-        rocks = self.terrain.rocks(Box(x, y, x + side, y + side), 1.5 * cell)
+        rocks = self.terrain.rocks(grid.box.grown(_ROCK_REACH_M), 1.5 * grid.cell_m)
         drawn = ground.copy()
-        _raise(drawn, rocks, rocks.diameter_m < min_drawn_m, (x, y), cell)
+        _raise(drawn, rocks, rocks.diameter_m < min_drawn_m, grid)
         tops = drawn.copy()
-        _raise(tops, rocks, rocks.diameter_m >= min_drawn_m, (x, y), cell)
+        _raise(tops, rocks, rocks.diameter_m >= min_drawn_m, grid)
         return drawn, tops
 
     def _fine(
@@ -181,10 +211,6 @@ class GroundTexture:
         shade = cast_shadows(fine, texel, self._sun)
         rim, inner = slice(m - 1, m + n + 1), slice(m, m + n)
         return fine[rim, rim].copy(), shade[rim, rim].copy(), tone[inner, inner].copy()
-
-
-def _square(field: Array, part: slice) -> Array:
-    return np.ascontiguousarray(field[part, part])
 
 
 def cast_shadows(height: Array, cell_m: float, sun: Array) -> Array:
@@ -210,13 +236,12 @@ def cast_shadows(height: Array, cell_m: float, sun: Array) -> Array:
     return shade.T if along_x else shade
 
 
-def _raise(
-    height: Array, rocks: Rocks, which: NDArray[np.bool_], origin: tuple[float, float], cell: float
-) -> None:
+def _raise(height: Array, rocks: Rocks, which: NDArray[np.bool_], grid: _Grid) -> None:
     """Lift a height map to the tops of some rocks."""
+    x, y = grid.x0 * grid.cell_m, grid.y0 * grid.cell_m
     for _, corners, faces in rocks.select(which).meshes():
         triangles = np.ascontiguousarray(corners[:, faces].reshape(-1, 3, 3))
-        raise_triangles(height, triangles, origin[0], origin[1], cell)
+        raise_triangles(height, triangles, x, y, grid.cell_m)
 
 
 def pyramid(tile: Floats) -> list[NDArray[np.uint16]]:

@@ -15,7 +15,7 @@ from lpet_sim.sensors.camera_spec import GroundDetailSpec
 from lpet_sim.sensors.clipmap import TILES, Level
 from lpet_sim.sensors.ground_texture import GroundTexture, pyramid
 from lpet_sim.sensors.render_scene import Eye, MeshLayout, RenderScene
-from lpet_sim.sensors.rock_look import GROUPS, RockLook, RockMesh, pack, split_groups
+from lpet_sim.sensors.rock_look import ATLAS, GROUPS, RockLook, RockMesh, pack, split_groups
 from lpet_sim.sensors.sky import HORIZON_RADIANCE
 from lpet_sim.terrain.box import Box
 from lpet_sim.terrain.terrain import Terrain
@@ -26,7 +26,6 @@ HAZE_M = 25_000.0
 
 _ROCK_LEVELS = 4
 _ROCK_MIN_TEXELS = 12.0
-_ATLAS = 2048
 _BLOCKS = TILES * TILES
 _VIEW_MARGIN_PX = 24.0
 _LOD_BIAS = 0.5
@@ -54,7 +53,7 @@ class GroundView:
         self._scene = RenderScene(
             self._eyes,
             self._layouts(),
-            [*(TILES * level.texels for level in self._levels), _ATLAS],
+            [*(TILES * level.texels for level in self._levels), ATLAS],
             spec.supersampling,
             (HORIZON_RADIANCE, HAZE_M),
         )
@@ -185,16 +184,16 @@ class GroundView:
 
     def _fill_atlas(self, rocks: list[RockMesh]) -> tuple[list[RockMesh], list[Array]]:
         """Pack the rocks' images, and give the rocks that found a place with their corners'."""
-        atlas = np.zeros((_ATLAS, _ATLAS), np.float32)
+        atlas = np.zeros((ATLAS, ATLAS), np.float32)
         kept, places = [], []
-        spots = pack([len(rock.image) for rock in rocks], _ATLAS)
+        spots = pack([len(rock.image) for rock in rocks], ATLAS)
         for rock, spot in zip(rocks, spots, strict=True):
             if spot is None:
                 continue
             edge = len(rock.image)
             atlas[spot[1] : spot[1] + edge, spot[0] : spot[0] + edge] = rock.image
             kept.append(rock)
-            places.append((rock.places * edge + spot) / _ATLAS)
+            places.append((rock.places * edge + spot) / ATLAS)
         self._scene.upload_tile(len(self._levels), 0, 0, pyramid(atlas))
         return kept, places
 

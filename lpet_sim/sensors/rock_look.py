@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,9 +19,15 @@ from lpet_sim.terrain.terrain import Terrain
 
 Floats = NDArray[np.float32]
 
+logger = logging.getLogger(__name__)
+
 GROUPS = 16
 """Meshes that rocks are spread over, each a compact set, so that those out of view cost nothing."""
 
+ATLAS = 2048
+"""Edge of the texture that holds all rocks' images [texels]."""
+
+_FILL = 0.7
 _SMALLEST_IMAGE, _LARGEST_IMAGE = 8, 256
 _GRAIN_M = 0.035
 _ROUGH = 0.10
@@ -54,6 +62,7 @@ class RockLook:
         self._terrain, self._key = terrain, key
         self._sun = np.array(terrain.spec.sun.direction)
         self._painted: dict[tuple[int, int], RockMesh] = {}
+        self._coarser: float | None = None
 
     def choose(
         self, boxes: Sequence[Box], min_diameters_m: Sequence[float], texels_m: Sequence[float],
@@ -67,21 +76,24 @@ class RockLook:
             texels_m: Texel of each box, which sets the size of the rocks' images [m].
             most_faces: How many triangles there may be.
         """
+        rings = self._rings(boxes, min_diameters_m)
+        if self._coarser is None:
+            self._coarser = _fit_images(rings, texels_m)
         kept: dict[tuple[int, int], RockMesh] = {}
+        for rocks, texel_m in zip(rings, texels_m, strict=True):
+            self._paint_all(rocks, self._coarser * texel_m, kept)
+        self._painted = kept
+        return _within(kept, most_faces)
+
+    def _rings(self, boxes: Sequence[Box], min_diameters_m: Sequence[float]) -> list[Rocks]:
+        """Give the rocks of each box that are not in the one within."""
+        rings = []
         for index, box in enumerate(boxes):
             rocks = self._terrain.rocks(box, min_diameters_m[index])
             if index:
                 rocks = rocks.select(~boxes[index - 1].contains(rocks.p_world_rock[:, :2]))
-            self._paint_all(rocks, texels_m[index], kept)
-        self._painted = kept
-        sizes = [mesh.image.shape[0] for mesh in kept.values()]
-        out, faces = [], 0
-        for mesh in (list(kept.values())[k] for k in np.argsort(sizes, kind="stable")[::-1]):
-            faces += len(mesh.corners)
-            if faces > most_faces:
-                break
-            out.append(mesh)
-        return out
+            rings.append(rocks)
+        return rings
 
     def _paint_all(
         self, rocks: Rocks, texel_m: float, kept: dict[tuple[int, int], RockMesh]
@@ -138,6 +150,34 @@ def _image_edge(diameter_m: float, texel_m: float) -> int:
     wish = 2.0 * diameter_m / texel_m
     edge = 2 ** int(np.ceil(np.log2(max(wish, 1.0)) - 0.3))
     return int(min(max(edge, _SMALLEST_IMAGE), _LARGEST_IMAGE))
+
+
+def _fit_images(rings: Sequence[Rocks], texels_m: Sequence[float]) -> float:
+    """Choose how much coarser than the ground's the rocks' texels are, for all to find a place.
+
+    It is chosen where a traverse begins and kept, so that no rock ever changes its image.
+    """
+    coarser = 1.0
+    while coarser < 64:
+        edges = [
+            _image_edge(float(diameter), coarser * texel)
+            for rocks, texel in zip(rings, texels_m, strict=True)
+            for diameter in rocks.diameter_m
+        ]
+        if sum(edge**2 for edge in edges) < _FILL * ATLAS**2:
+            break
+        coarser *= math.sqrt(2)
+    return coarser
+
+
+def _within(kept: dict[tuple[int, int], RockMesh], most_faces: int) -> list[RockMesh]:
+    """Give the rocks by falling size of their image, as many as there are triangles for."""
+    meshes = sorted(kept.values(), key=lambda mesh: -len(mesh.image))
+    total = np.cumsum([len(mesh.corners) for mesh in meshes])
+    count = int(np.searchsorted(total, most_faces, side="right"))
+    if count < len(meshes):
+        logger.warning("%d small rocks are not drawn: raise rock_faces", len(meshes) - count)
+    return meshes[:count]
 
 
 def pack(sizes: Sequence[int], atlas: int) -> list[tuple[int, int] | None]:
