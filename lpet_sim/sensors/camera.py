@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lpet_sim.geometry import SE3
 from lpet_sim.sensors.camera_spec import StereoCameraSpec
 from lpet_sim.sensors.ground_view import GroundView
-from lpet_sim.sensors.render_scene import Eye
+from lpet_sim.sensors.render_layout import Eye
 from lpet_sim.sensors.sky import sky_coefficients, sky_radiance
 from lpet_sim.terrain.terrain import Terrain
 

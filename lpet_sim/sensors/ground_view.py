@@ -14,7 +14,8 @@ from lpet_sim.sensors import clipmap
 from lpet_sim.sensors.camera_spec import GroundDetailSpec
 from lpet_sim.sensors.clipmap import TILES, Level
 from lpet_sim.sensors.ground_texture import GroundTexture, pyramid
-from lpet_sim.sensors.render_scene import Eye, MeshLayout, RenderScene
+from lpet_sim.sensors.render_layout import Eye, MeshLayout
+from lpet_sim.sensors.render_scene import RenderScene
 from lpet_sim.sensors.rock_look import ATLAS, GROUPS, RockLook, RockMesh, pack, split_groups
 from lpet_sim.sensors.sky import HORIZON_RADIANCE
 from lpet_sim.terrain.box import Box

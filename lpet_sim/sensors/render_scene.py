@@ -10,7 +10,6 @@ from __future__ import annotations
 import importlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 os.environ.setdefault("PYOPENGL_PLATFORM", os.environ.get("MUJOCO_GL", "egl"))
@@ -22,47 +21,14 @@ from OpenGL import GL  # type: ignore[import-untyped]
 
 from lpet_sim.errors import UnknownNameError
 from lpet_sim.geometry import SE3
-from lpet_sim.recording.arrays import Array, Ints
+from lpet_sim.recording.arrays import Array
+from lpet_sim.sensors.render_layout import Eye, MeshLayout
 
 NEAR_M = 0.05
 FAR_M = 40_000.0
 _HIDDEN, _SHOWN = 5, 0
 _CONTEXTS = ("egl", "glfw", "osmesa")
 _OPTICAL_TO_GL = np.diag([1.0, -1.0, -1.0])
-
-
-@dataclass(frozen=True)
-class MeshLayout:
-    """A mesh whose corners may move but whose triangles stay.
-
-    Attributes:
-        corners: How many corners it has.
-        faces: Triangles, counter-clockwise from outside, Shape (f, 3).
-        texture: Index of its texture.
-    """
-
-    corners: int
-    faces: Ints
-    texture: int
-
-
-@dataclass(frozen=True)
-class Eye:
-    """One pinhole camera; pixel (0, 0) is the centre of the first pixel.
-
-    Attributes:
-        width_px: Image width.
-        height_px: Image height.
-        focal_px: Focal length [px].
-        cx_px: Principal point along u [px].
-        cy_px: Principal point along v [px].
-    """
-
-    width_px: int
-    height_px: int
-    focal_px: float
-    cx_px: float
-    cy_px: float
 
 
 class RenderScene:
@@ -278,7 +244,8 @@ def _add_texture(spec: mujoco.MjSpec, index: int, size: int) -> None:
 
 def _add_mesh(spec: mujoco.MjSpec, index: int, mesh: MeshLayout) -> None:
     """Add a mesh of the right counts; its shape is a place-holder until the first upload."""
-    corners = np.random.default_rng(0).random((mesh.corners, 3))
+    at = np.arange(mesh.corners)
+    corners = np.stack([np.cos(at), np.sin(1.3 * at), np.cos(2.1 * at)], axis=1)
     spec.add_mesh(
         name=f"mesh{index}",
         uservert=corners.ravel(),

@@ -10,7 +10,8 @@ import pytest
 from lpet_sim.geometry import SE3
 from lpet_sim.sensors.camera import StereoRenderer, make_eyes, place_eyes
 from lpet_sim.sensors.camera_spec import GroundDetailSpec, StereoCameraSpec
-from lpet_sim.sensors.render_scene import MeshLayout, RenderScene
+from lpet_sim.sensors.render_layout import MeshLayout
+from lpet_sim.sensors.render_scene import RenderScene
 from lpet_sim.sensors.sky import sky_coefficients, sky_radiance
 from lpet_sim.terrain.spec import ReliefSpec, RockAbundanceSpec, SunSpec, TerrainSpec
 from lpet_sim.terrain.terrain import Terrain, build_terrain
