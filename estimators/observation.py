@@ -23,73 +23,80 @@ def camera_vector(calibration: StereoCalibration) -> Array:
 
 
 @njit(cache=True)
-def lift(camera: Array, x: Array) -> tuple[Array, float]:
-    """Give the homogeneous point ``(P, w)`` of a sighting.
+def _push(
+    camera: Array, P: tuple[float, float, float, float], dP: tuple[float, float, float, float]
+) -> tuple[float, float, float]:
+    """Give how the projection (u_left, u_right, v) of ``(P, w)`` changes with ``(dP, dw)``.
+
+    ``u_left = f X/Z + cx``, ``u_right = f (X - b w)/Z + cx``, ``v = f Y/Z + cy``.
+    """
+    scale = camera[0] / P[2]
+    du_left = scale * (dP[0] - dP[2] * P[0] / P[2])
+    parallax = scale * camera[3] * (dP[3] - dP[2] * P[3] / P[2])
+    return du_left, du_left - parallax, scale * (dP[1] - dP[2] * P[1] / P[2])
+
+
+@njit(cache=True)
+def transfer_into(
+    camera: Array, R_a_b: Array, t_back: Array, x: Array, predicted: Array, G: Array, J: Array
+) -> None:
+    """Predict where camera b sees what camera a saw at x, with both Jacobians, in place.
+
+    With ``P_b = R_a_b' P - t_back w`` and the right perturbation ``T_a_b exp(xi)``, ``xi = (rho,
+    phi)``: ``dP_b = -w rho + P_b x phi``.
 
     Args:
         camera: `camera_vector`.
-        x: (u_left, u_right, v) [px], Shape (3,).
+        R_a_b: Rotation of camera b in camera a, Shape (3, 3).
+        t_back: ``R_a_b' t_a_b`` [m], Shape (3,).
+        x: Sighting in camera a [px], Shape (3,).
+        predicted: Takes the sighting in camera b [px], Shape (3,).
+        G: Takes its derivative by x, Shape (3, 3).
+        J: Takes its derivative by xi [px/m, px/rad], Shape (3, 6).
     """
-    focal, cx, cy, baseline = camera
-    return baseline * np.array([x[0] - cx, x[2] - cy, focal]), x[0] - x[1]
-
-
-@njit(cache=True)
-def view(camera: Array, P: Array, w: float) -> Array:
-    """Project a homogeneous point of the camera to (u_left, u_right, v) [px], Shape (3,)."""
-    focal, cx, cy, baseline = camera
-    u_left = focal * P[0] / P[2] + cx
-    return np.array([u_left, u_left - focal * baseline * w / P[2], focal * P[1] / P[2] + cy])
-
-
-@njit(cache=True)
-def view_jacobian(camera: Array, P: Array, w: float) -> Array:
-    """Give d(u_left, u_right, v)/d(P, w), Shape (3, 4)."""
-    focal, _, _, baseline = camera
-    k = focal / P[2]
-    out = np.zeros((3, 4))
-    out[0, 0] = out[1, 0] = out[2, 1] = k
-    out[0, 2] = -k * P[0] / P[2]
-    out[1, 2] = -k * (P[0] - baseline * w) / P[2]
-    out[1, 3] = -k * baseline
-    out[2, 2] = -k * P[1] / P[2]
-    return out
+    focal, cx, cy, b = camera
+    r, t, w = R_a_b, t_back, x[0] - x[1]
+    p0, p1, p2 = b * (x[0] - cx), b * (x[2] - cy), b * focal
+    X = r[0, 0] * p0 + r[1, 0] * p1 + r[2, 0] * p2 - t[0] * w
+    Y = r[0, 1] * p0 + r[1, 1] * p1 + r[2, 1] * p2 - t[1] * w
+    Z = r[0, 2] * p0 + r[1, 2] * p1 + r[2, 2] * p2 - t[2] * w
+    P = (X, Y, Z, w)
+    predicted[0], predicted[2] = focal * X / Z + cx, focal * Y / Z + cy
+    predicted[1] = predicted[0] - focal * b * w / Z
+    along_u = (b * r[0, 0] - t[0], b * r[0, 1] - t[1], b * r[0, 2] - t[2], 1.0)
+    G[0, 0], G[1, 0], G[2, 0] = _push(camera, P, along_u)
+    G[0, 1], G[1, 1], G[2, 1] = _push(camera, P, (t[0], t[1], t[2], -1.0))
+    G[0, 2], G[1, 2], G[2, 2] = _push(camera, P, (b * r[1, 0], b * r[1, 1], b * r[1, 2], 0.0))
+    J[0, 0], J[1, 0], J[2, 0] = _push(camera, P, (-w, 0.0, 0.0, 0.0))
+    J[0, 1], J[1, 1], J[2, 1] = _push(camera, P, (0.0, -w, 0.0, 0.0))
+    J[0, 2], J[1, 2], J[2, 2] = _push(camera, P, (0.0, 0.0, -w, 0.0))
+    J[0, 3], J[1, 3], J[2, 3] = _push(camera, P, (0.0, Z, -Y, 0.0))
+    J[0, 4], J[1, 4], J[2, 4] = _push(camera, P, (-Z, 0.0, X, 0.0))
+    J[0, 5], J[1, 5], J[2, 5] = _push(camera, P, (Y, -X, 0.0, 0.0))
 
 
 @njit(cache=True)
 def transfer_with_jacobians(
-    camera: Array, R_a_b: Array, t_a_b: Array, x: Array
+    camera: Array, R_a_b: Array, t_a_b: Array, stereo_px: Array
 ) -> tuple[Array, Array, Array]:
-    """Predict where camera b sees what camera a saw at x, with both Jacobians.
-
-    With ``P_b = R_a_b' (P - t_a_b w)`` and the right perturbation ``T_a_b exp(xi)``, ``xi =
-    (rho, phi)``: ``dP_b = -w rho + P_b x phi``.
+    """Predict where camera b sees what camera a saw, with both Jacobians; see `transfer_into`.
 
     Args:
         camera: `camera_vector`.
         R_a_b: Rotation of camera b in camera a, Shape (3, 3).
         t_a_b: Position of camera b in camera a [m], Shape (3,).
-        x: Sighting in camera a [px], Shape (3,).
+        stereo_px: Sightings in camera a [px], Shape (n, 3).
 
     Returns:
-        The sighting in camera b [px], Shape (3,); its derivative by x, Shape (3, 3); its
-        derivative by xi [px/m, px/rad], Shape (3, 6).
+        Sightings in camera b [px], Shape (n, 3); their derivatives by those in a, Shape
+        (n, 3, 3); their derivatives by xi, Shape (n, 3, 6).
     """
-    P, w = lift(camera, x)
-    P_b = R_a_b.T @ (P - t_a_b * w)
-    by_P = view_jacobian(camera, P_b, w)
+    n = len(stereo_px)
+    predicted, G, J = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 6))
     t_back = R_a_b.T @ t_a_b
-    dP = np.zeros((4, 3))
-    dP[:3, 0] = camera[3] * R_a_b[0] - t_back
-    dP[:3, 1] = t_back
-    dP[:3, 2] = camera[3] * R_a_b[1]
-    dP[3, 0], dP[3, 1] = 1.0, -1.0
-    dxi = np.zeros((4, 6))
-    dxi[0, 0] = dxi[1, 1] = dxi[2, 2] = -w
-    dxi[0, 4], dxi[0, 5] = -P_b[2], P_b[1]
-    dxi[1, 3], dxi[1, 5] = P_b[2], -P_b[0]
-    dxi[2, 3], dxi[2, 4] = -P_b[1], P_b[0]
-    return view(camera, P_b, w), by_P @ dP, by_P @ dxi
+    for i in range(n):
+        transfer_into(camera, R_a_b, t_back, stereo_px[i], predicted[i], G[i], J[i])
+    return predicted, G, J
 
 
 def transfer(calibration: StereoCalibration, T_a_b: SE3, stereo_px: Array) -> Array:
@@ -101,6 +108,5 @@ def transfer(calibration: StereoCalibration, T_a_b: SE3, stereo_px: Array) -> Ar
         stereo_px: (u_left, u_right, v) in camera a [px], Shape (n, 3).
     """
     camera = camera_vector(calibration)
-    R, t = np.ascontiguousarray(T_a_b.rotation), np.ascontiguousarray(T_a_b.translation)
-    rows = [transfer_with_jacobians(camera, R, t, x)[0] for x in np.asarray(stereo_px, float)]
-    return np.array(rows).reshape(-1, 3)
+    R, t = np.array(T_a_b.rotation), np.array(T_a_b.translation)
+    return transfer_with_jacobians(camera, R, t, np.array(stereo_px, dtype=float))[0]

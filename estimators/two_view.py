@@ -5,8 +5,8 @@ are weighted by their own noise:
 
     min over T_a_b, x of  sum |s_a - x|^2 / sigma_a^2 + |s_b - g(x, T_a_b)|^2 / sigma_b^2
 
-Each x is marginalised in closed form: the innovation ``r = s_b - g(x) - G (s_a - x)`` has covariance
-``S = sigma_b^2 I + sigma_a^2 G G'``, and a Gauss-Newton step for the motion is a 6x6 system.
+Each x is marginalised in closed form: the innovation ``r = s_b - g(x) - G (s_a - x)`` has the
+covariance ``S = sigma_b^2 I + sigma_a^2 G G'``, and a Gauss-Newton step is a 6x6 system.
 
 Reference:
     Matthies, Dynamic Stereo Vision (1989), ch. 4, for weighting both views; the marginalisation is
@@ -51,28 +51,52 @@ def innovations(
         Innovations r, Shape (n, 3); the information S^-1, Shape (n, 3, 3); G, Shape (n, 3, 3);
         the derivative J of the prediction by the motion, Shape (n, 3, 6).
     """
+    predicted, G, J = transfer_with_jacobians(camera, R, t, x)
     n = len(s_a)
-    r, info = np.empty((n, 3)), np.empty((n, 3, 3))
-    G, J = np.empty((n, 3, 3)), np.empty((n, 3, 6))
+    r, info, S = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((3, 3))
     for i in range(n):
-        predicted, G[i], J[i] = transfer_with_jacobians(camera, R, t, x[i])
-        r[i] = s_b[i] - predicted - G[i] @ (s_a[i] - x[i])
-        S = var_a[i] * (G[i] @ G[i].T)
-        for k in range(3):
-            S[k, k] += var_b[i]
-        info[i] = np.linalg.inv(S)
+        for a in range(3):
+            r[i, a] = s_b[i, a] - predicted[i, a]
+            for b in range(3):
+                r[i, a] -= G[i, a, b] * (s_a[i, b] - x[i, b])
+                S[a, b] = var_b[i] if a == b else 0.0
+                for c in range(3):
+                    S[a, b] += var_a[i] * G[i, a, c] * G[i, b, c]
+        _invert_3x3(S, info[i])
     return r, info, G, J
+
+
+@njit(cache=True)
+def _invert_3x3(S: Array, out: Array) -> None:
+    """Invert a symmetric 3x3 matrix; one that has no inverse gives zero: no information."""
+    for i in range(3):
+        for j in range(3):
+            a, b, c, d = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
+            out[j, i] = S[a, c] * S[b, d] - S[a, d] * S[b, c]
+    determinant = S[0, 0] * out[0, 0] + S[0, 1] * out[1, 0] + S[0, 2] * out[2, 0]
+    sound = determinant > 0 and np.isfinite(determinant)
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = out[i, j] / determinant if sound else 0.0
 
 
 @njit(cache=True)
 def solve_motion(r: Array, info: Array, J: Array, weight: Array) -> tuple[Array, Array]:
     """Give the weighted least-squares twist and its normal matrix."""
-    H, g = np.zeros((6, 6)), np.zeros(6)
+    H, g, JtW = np.zeros((6, 6)), np.zeros(6), np.empty((6, 3))
     for i in range(len(r)):
-        if weight[i] > 0:
-            JtW = weight[i] * (J[i].T @ info[i])
-            H += JtW @ J[i]
-            g += JtW @ r[i]
+        if weight[i] <= 0:
+            continue
+        for a in range(6):
+            for b in range(3):
+                JtW[a, b] = 0.0
+                for c in range(3):
+                    JtW[a, b] += weight[i] * J[i, c, a] * info[i, c, b]
+                g[a] += JtW[a, b] * r[i, b]
+        for a in range(6):
+            for b in range(6):
+                for c in range(3):
+                    H[a, b] += JtW[a, c] * J[i, c, b]
     for k in range(6):
         H[k, k] += 1e-12 * H[k, k] + 1e-12
     return np.linalg.solve(H, g), H
@@ -80,11 +104,34 @@ def solve_motion(r: Array, info: Array, J: Array, weight: Array) -> tuple[Array,
 
 @njit(cache=True)
 def chi_squares(r: Array, info: Array) -> Array:
-    """Give ``r' S^-1 r`` of each innovation, Shape (n,)."""
-    out = np.empty(len(r))
+    """Give ``r' S^-1 r`` of each innovation, Shape (n,); infinite where S has no inverse."""
+    out = np.zeros(len(r))
     for i in range(len(r)):
-        out[i] = r[i] @ (info[i] @ r[i])
+        for a in range(3):
+            for b in range(3):
+                out[i] += r[i, a] * info[i, a, b] * r[i, b]
+        if info[i, 0, 0] <= 0 or not np.isfinite(out[i]):
+            out[i] = np.inf
     return out
+
+
+@njit(cache=True)
+def _move_landmarks(
+    x: Array, s_a: Array, var_a: Array, r: Array, info: Array, G: Array, J: Array, xi: Array
+) -> None:
+    """Set ``x = s_a + sigma_a^2 G' S^-1 (r - J xi)``, the landmarks given the motion, in place."""
+    for i in range(len(x)):
+        for b in range(3):
+            x[i, b] = s_a[i, b]
+        for a in range(3):
+            rest = 0.0
+            for c in range(3):
+                left = r[i, c]
+                for k in range(6):
+                    left -= J[i, c, k] * xi[k]
+                rest += info[i, a, c] * left
+            for b in range(3):
+                x[i, b] += var_a[i] * G[i, a, b] * rest
 
 
 @njit(cache=True)
@@ -113,8 +160,7 @@ def refine(
         r, info, G, J = innovations(camera, R, t, s_a, s_b, var_a, var_b, x)
         weight = use * student_weights(chi_squares(r, info), kernel)
         xi, _ = solve_motion(r, info, J, weight)
-        for i in range(len(x)):
-            x[i] = s_a[i] + var_a[i] * (G[i].T @ (info[i] @ (r[i] - J[i] @ xi)))
+        _move_landmarks(x, s_a, var_a, r, info, G, J, xi)
         dR, dt = exp_pose(xi)
         t = t + R @ dt
         R = R @ dR

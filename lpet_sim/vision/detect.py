@@ -15,6 +15,7 @@ from lpet_sim.vision.spec import SiftSpec
 Image = NDArray[Any]
 Floats = NDArray[np.float32]
 
+DESCRIPTOR_LENGTH = 128
 _FIELDS_PER_KEYPOINT = 5
 
 
@@ -79,7 +80,7 @@ class SiftDetector:
     def _detect(self, sift: Any, image: Image) -> Features:
         keypoints, descriptor = sift.detectAndCompute(self._to_uint8(image), None)
         if descriptor is None:
-            descriptor = np.zeros((0, 128), np.float32)
+            descriptor = np.zeros((0, DESCRIPTOR_LENGTH), np.float32)
         table = np.array(
             [(*k.pt, k.size, k.angle, k.response) for k in keypoints], dtype=np.float32
         ).reshape(-1, _FIELDS_PER_KEYPOINT)
@@ -102,7 +103,7 @@ class SiftDetector:
 
 def _make_sift(spec: SiftSpec) -> Any:
     # Without the precise upscaling keypoints of the doubled image are a quarter pixel off.
-    return cv2.SIFT_create(
+    return cv2.SIFT_create(  # type: ignore[attr-defined]
         nfeatures=spec.keypoints_max,
         nOctaveLayers=spec.octave_layers,
         contrastThreshold=spec.contrast_threshold,

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from lpet_sim.progress import Progress, silent, track
 from lpet_sim.recording.calibration import StereoCalibration
 from lpet_sim.recording.streams import SightingStream, StereoImages, concatenate_slices
-from lpet_sim.vision.detect import SiftDetector
+from lpet_sim.vision.detect import Floats, SiftDetector
 from lpet_sim.vision.gallery import Gallery
-from lpet_sim.vision.spec import FrontEndSpec
+from lpet_sim.vision.spec import FrontEndSpec, RefineSpec
 from lpet_sim.vision.stereo import StereoFeatures, match_stereo, refine_disparity, sorted_by_row
 from lpet_sim.vision.temporal import align_with_templates, cut_templates, match_gallery
 
@@ -52,8 +52,8 @@ class FrontEnd:
         self._spec = spec
         self._calibration = calibration
         self._detector = SiftDetector(spec.sift)
-        self._gallery = Gallery.empty(2 * spec.refine.half_width_px + 3)
         self._next_id = 0
+        self._gallery = self._new(0)
 
     def track(self, left: Image, right: Image) -> ImageSightings:
         """Find the landmarks of the next image pair.
@@ -63,67 +63,80 @@ class FrontEnd:
             right: Right grey image, likewise.
         """
         spec = self._spec
-        eyes = map(sorted_by_row, self._detector.detect_pair(left, right))
-        features = match_stereo(*eyes, self._calibration, spec.stereo)
+        eye_left, eye_right = map(sorted_by_row, self._detector.detect_pair(left, right))
+        features = match_stereo(eye_left, eye_right, self._calibration, spec.stereo)
         aged = self._gallery.aged(spec.temporal.time_to_live)
         gallery, match = match_gallery(aged, features, self._calibration, spec.temporal)
-        seen, sigma_px = self._seen(gallery, match, features, np.float32(left), np.float32(right))
-        self._gallery = gallery.take(match < 0).joined(seen)
-        return self._chosen(seen, sigma_px)
+        seen = self._named(gallery, match, features)
+        chosen = self._chosen(seen)
+        eyes = left.astype(np.float32), right.astype(np.float32)
+        refined, sigma_px = refine(seen.take(chosen), *eyes, spec.refine)
+        others = seen.take(np.setdiff1d(np.arange(len(seen)), chosen))
+        self._gallery = gallery.take(match < 0).joined(others).joined(refined)
+        return self._report(refined, sigma_px)
 
-    def _seen(
-        self,
-        gallery: Gallery,
-        match: Ints,
-        features: StereoFeatures,
-        left: NDArray[np.float32],
-        right: NDArray[np.float32],
-    ) -> tuple[Gallery, Array]:
-        """Refine what is seen: old landmarks by their templates, then all against the right eye."""
-        refine = self._spec.refine
+    def _named(self, gallery: Gallery, match: Ints, features: StereoFeatures) -> Gallery:
+        """Give every feature of this image its landmark: one that is known, or a new one."""
         known = gallery.take(match >= 0)
-        rows = match[match >= 0]
-        new = np.setdiff1d(np.arange(len(features)), rows)
-        rows = np.concatenate([rows, new])
-        px = features.stereo_px[rows]
-        n, m = len(known), len(rows)
-        kept = np.zeros(m, dtype=bool)
-        sigma_uv = np.zeros(m)
-        if refine.temporal:
-            uv, sigma_uv[:n], kept[:n] = align_with_templates(known, left, px[:n], refine)
-            px[:n, 1] += uv[:, 0] - px[:n, 0]
-            px[:n, [0, 2]] = uv
-        px[:, 1], sigma_right = refine_disparity(left, right, px, refine)
-        template = cut_templates(left, px[:, [0, 2]], refine.half_width_px + 1)
-        template[kept] = known.template[kept[:n]]
-        disparity = px[:, 0] - px[:, 1]
-        disparity[kept] = known.template_disparity_px[kept[:n]]
-        fresh_ids = self._next_id + np.arange(m - n)
-        self._next_id += m - n
-        seen = Gallery(
-            np.concatenate([known.landmark_id, fresh_ids]),
-            px,
-            features.left.size_px[rows],
-            features.left.descriptor[rows],
-            template,
-            disparity,
-            np.zeros(m, np.int64),
-            np.concatenate([known.sightings, np.zeros(m - n, np.int64)]) + 1,
+        rows_new = np.setdiff1d(np.arange(len(features)), match)
+        rows = np.concatenate([match[match >= 0], rows_new])
+        named = known.joined(self._new(len(rows_new)))
+        return replace(
+            named,
+            stereo_px=features.stereo_px[rows],
+            size_px=features.left.size_px[rows],
+            descriptor=features.left.descriptor[rows],
+            unseen=np.zeros(len(rows), np.int64),
         )
-        worst = np.maximum(sigma_uv, sigma_right)
-        aligned = np.hypot(np.where(np.isfinite(worst), worst, 0.0), refine.sigma_floor_px)
-        sigma = np.where(np.isfinite(worst), aligned, refine.sigma_keypoint_px)
-        return seen, np.minimum(sigma, refine.sigma_keypoint_px)
 
-    def _chosen(self, seen: Gallery, sigma_px: Array) -> ImageSightings:
-        """Choose who is reported: spread over the image, the longest known first."""
-        sound = seen.stereo_px[:, 0] - seen.stereo_px[:, 1] >= self._spec.stereo.disparity_min_px
-        rows = np.flatnonzero(sound)
-        if 0 < self._spec.sightings_max < len(rows):
-            order = spread(seen.take(rows), self._calibration)
-            rows = rows[order[: self._spec.sightings_max]]
-        rows = rows[np.argsort(seen.landmark_id[rows])]
-        return ImageSightings(seen.landmark_id[rows], seen.stereo_px[rows], sigma_px[rows])
+    def _new(self, count: int) -> Gallery:
+        """Make landmarks that have nothing yet but an id."""
+        ids = self._next_id + np.arange(count)
+        self._next_id += count
+        return Gallery.blank(ids, 2 * self._spec.refine.half_width_px + 3)
+
+    def _chosen(self, seen: Gallery) -> Ints:
+        """Choose who is refined and reported: spread over the image, the longest known first."""
+        order = spread(seen, self._calibration)
+        return order[: self._spec.sightings_max] if self._spec.sightings_max > 0 else order
+
+    def _report(self, refined: Gallery, sigma_px: Array) -> ImageSightings:
+        disparity = refined.stereo_px[:, 0] - refined.stereo_px[:, 1]
+        rows = np.flatnonzero(disparity >= self._spec.stereo.disparity_min_px)
+        rows = rows[np.argsort(refined.landmark_id[rows])]
+        return ImageSightings(refined.landmark_id[rows], refined.stereo_px[rows], sigma_px[rows])
+
+
+def refine(seen: Gallery, left: Floats, right: Floats, spec: RefineSpec) -> tuple[Gallery, Array]:
+    """Refine landmarks that are seen: by their templates in the left eye, then in the right eye.
+
+    A landmark without a template, or whose template fits no more, gets a new one at the keypoint.
+
+    Args:
+        seen: The landmarks, ``stereo_px`` at their keypoints.
+        left: Left image, Shape (h, w), float32.
+        right: Right image, likewise.
+        spec: Parameters.
+
+    Returns:
+        The landmarks with refined coordinates and up-to-date templates, and the noise declared for
+        these coordinates, 1 sigma [px], Shape (n,).
+    """
+    px = seen.stereo_px.copy()
+    uv, sigma_uv, keep = align_with_templates(seen, left, px, spec)
+    px[:, 1] += uv[:, 0] - px[:, 0]
+    px[:, [0, 2]] = uv
+    px[:, 1], sigma_right = refine_disparity(left, right, px, spec)
+    cut = cut_templates(left, uv, spec.half_width_px + 1)
+    refined = replace(
+        seen,
+        stereo_px=px,
+        template=np.where(keep[:, None, None], seen.template, cut),
+        template_disparity_px=np.where(keep, seen.template_disparity_px, px[:, 0] - px[:, 1]),
+        reported=seen.reported + 1,
+    )
+    sigma_px = np.hypot(np.maximum(sigma_uv, sigma_right), spec.sigma_floor_px)
+    return refined, np.minimum(sigma_px, spec.sigma_keypoint_px)
 
 
 def spread(seen: Gallery, calibration: StereoCalibration) -> Ints:
@@ -134,11 +147,11 @@ def spread(seen: Gallery, calibration: StereoCalibration) -> Ints:
     shape = np.array([calibration.width_px, calibration.height_px])
     cell = (seen.stereo_px[:, [0, 2]] * _GRID_CELLS / shape).astype(np.int64)
     key = cell[:, 1] * _GRID_CELLS + cell[:, 0]
-    by_cell = np.lexsort((seen.landmark_id, -seen.sightings, key))
+    by_cell = np.lexsort((seen.landmark_id, -seen.reported, key))
     starts = np.searchsorted(key[by_cell], key[by_cell])
     rank = np.empty(len(key), np.int64)
     rank[by_cell] = np.arange(len(key)) - starts
-    return np.lexsort((seen.landmark_id, -seen.sightings, rank))
+    return np.lexsort((seen.landmark_id, -seen.reported, rank))
 
 
 def sight(

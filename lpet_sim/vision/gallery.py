@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from lpet_sim.vision.detect import Floats
+from lpet_sim.vision.detect import DESCRIPTOR_LENGTH, Floats
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -24,9 +24,10 @@ class Gallery:
         size_px: Size of the keypoint [px], Shape (n,).
         descriptor: As last seen, Shape (n, d).
         template: Patch of the left image where the landmark's place was fixed, Shape (n, k, k).
-        template_disparity_px: Disparity in that image [px], Shape (n,).
-        unseen: Images since the last sighting, Shape (n,).
-        sightings: How often it was seen, Shape (n,).
+        template_disparity_px: Disparity in that image [px], Shape (n,); NaN where there is no
+            template yet.
+        unseen: Images since it was last seen, Shape (n,).
+        reported: How often it was reported, Shape (n,).
     """
 
     landmark_id: Ints
@@ -36,21 +37,26 @@ class Gallery:
     template: Floats
     template_disparity_px: Array
     unseen: Ints
-    sightings: Ints
+    reported: Ints
 
     @classmethod
-    def empty(cls, patch_px: int) -> Gallery:
-        """Make a gallery without landmarks, for templates of ``patch_px`` squared."""
-        none = np.zeros(0, np.int64)
+    def blank(cls, landmark_id: Ints, patch_px: int) -> Gallery:
+        """Make landmarks of which nothing is known yet but their ids.
+
+        Args:
+            landmark_id: Shape (n,); none for an empty gallery.
+            patch_px: Templates are ``patch_px`` squared.
+        """
+        n = len(landmark_id)
         return cls(
-            none,
-            np.zeros((0, 3)),
-            np.zeros(0, np.float32),
-            np.zeros((0, 128), np.float32),
-            np.zeros((0, patch_px, patch_px), np.float32),
-            np.zeros(0),
-            none,
-            none,
+            landmark_id.astype(np.int64),
+            np.zeros((n, 3)),
+            np.zeros(n, np.float32),
+            np.zeros((n, DESCRIPTOR_LENGTH), np.float32),
+            np.zeros((n, patch_px, patch_px), np.float32),
+            np.full(n, np.nan),
+            np.zeros(n, np.int64),
+            np.zeros(n, np.int64),
         )
 
     def __len__(self) -> int:

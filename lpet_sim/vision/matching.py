@@ -22,7 +22,7 @@ def _distance2(a: Floats, b: Floats) -> float:
     for k in range(a.size):
         d = a[k] - b[k]
         total += d * d
-    return total
+    return float(total)
 
 
 @njit(cache=True)

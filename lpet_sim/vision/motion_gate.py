@@ -15,14 +15,16 @@ from lpet_sim.recording.calibration import StereoCalibration
 Array = NDArray[np.float64]
 
 _KERNEL_PX = 2.0
-_ROUNDS = 12
+_WIDEST_PX = 64.0
+_ROUNDS = 9
+_MATCHES = 300
 
 
 def fit_motion(calibration: StereoCalibration, before_px: Array, after_px: Array) -> SE3:
     """Fit ``T_after_before`` to matches by Gauss-Newton with a Geman-McClure kernel.
 
-    The kernel starts wide and narrows (graduated non-convexity), so that a third of false matches
-    does no harm.
+    The kernel starts wide and narrows by half each round (graduated non-convexity), so that a third
+    of false matches does no harm.
 
     Args:
         calibration: The declared pair.
@@ -32,20 +34,25 @@ def fit_motion(calibration: StereoCalibration, before_px: Array, after_px: Array
     Reference:
         Yang et al., Graduated non-convexity for robust spatial perception (2020).
     """
-    p = calibration.triangulate(before_px)
+    every = max(1, len(before_px) // _MATCHES)
+    p, after = calibration.triangulate(before_px[::every]), after_px[::every]
     T = SE3.identity()
     for k in range(_ROUNDS):
-        kernel_px = _KERNEL_PX * max(1.0, 32.0 / 2.0**k)
+        kernel_px = max(_KERNEL_PX, _WIDEST_PX / 2**k)
         q = T @ p
-        residual = after_px - calibration.project(q)
-        J = calibration.projection_jacobian(q) @ np.concatenate(
-            [np.broadcast_to(np.eye(3), (len(q), 3, 3)), -so3.hat(q)], axis=2
-        )
-        weight = (1 + (residual**2).sum(axis=1) / kernel_px**2) ** -2
-        H = np.einsum("n,nij,nik->jk", weight, J, J, optimize=True)
-        g = np.einsum("n,nij,ni->j", weight, J, residual, optimize=True)
-        T = SE3.exp(np.linalg.solve(H + 1e-6 * np.eye(6), g)) @ T
+        residual = after - calibration.project(q)
+        weight = (1 + (residual**2).sum(axis=1) / kernel_px**2) ** -1
+        xi = _step(calibration.projection_jacobian(q), q, residual, weight)
+        T = SE3.exp(xi) @ T
     return T
+
+
+def _step(by_point: Array, q: Array, residual: Array, root_weight: Array) -> Array:
+    """Solve one weighted step of a left perturbation, ``dq = rho + phi x q``, Shape (6,)."""
+    J = np.concatenate([by_point, -by_point @ so3.hat(q)], axis=2) * root_weight[:, None, None]
+    J = J.reshape(-1, 6)
+    H = J.T @ J + 1e-6 * np.eye(6)
+    return np.asarray(np.linalg.solve(H, J.T @ (residual * root_weight[:, None]).ravel()))
 
 
 def predict(

@@ -20,7 +20,8 @@ from lpet_sim.vision.stereo import StereoFeatures
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_TRANSLATION = np.array([0, 3])
+# All of an affine map: ground nearby is seen under a changing slant, not only larger.
+_AFFINE = np.arange(6)
 # A template seen at another scale than this is cut anew: its texture is no longer the same.
 _TEMPLATE_SCALE_MAX = 1.5
 
@@ -93,7 +94,8 @@ def align_with_templates(
     """Refine where landmarks are by aligning each one's template with the left image.
 
     The template is that of the image where the landmark's place was fixed, not of the last one, so
-    that errors do not add up from image to image. It is scaled by the ratio of the disparities.
+    that errors do not add up from image to image. The alignment is affine and starts from the scale
+    that the ratio of the disparities tells.
 
     Args:
         gallery: The landmarks, one for each row of ``stereo_px``.
@@ -102,14 +104,20 @@ def align_with_templates(
         spec: Parameters.
 
     Returns:
-        (u_left, v) [px], Shape (n, 2); their standard deviation [px], Shape (n,), inf where the
-        alignment failed; and whether the template should be kept, Shape (n,).
+        (u_left, v) [px], Shape (n, 2); their standard deviation [px], Shape (n,), 0 where there was
+        no template and the keypoint is the landmark's place, inf where the alignment failed; and
+        whether the template should be kept, Shape (n,).
     """
     scale = (stereo_px[:, 0] - stereo_px[:, 1]) / gallery.template_disparity_px
-    settings = (spec.iterations_max, spec.shift_max_px, spec.correlation_min)
-    uv, sigma = _align_all(gallery.template, scale, left, stereo_px[:, [0, 2]].copy(), *settings)
+    uv, sigma = stereo_px[:, [0, 2]].copy(), np.zeros(len(stereo_px))
+    rows = np.flatnonzero(np.isfinite(scale)) if spec.temporal else np.zeros(0, np.int64)
+    settings = (spec.iterations_max, spec.shift_max_px, spec.correlation_min, _AFFINE)
+    uv[rows], sigma[rows] = _align_all(
+        gallery.template[rows], scale[rows], left, uv[rows], *settings
+    )
     fresh = (scale < _TEMPLATE_SCALE_MAX) & (scale > 1 / _TEMPLATE_SCALE_MAX)
-    return uv, sigma, fresh & np.isfinite(sigma)
+    aligned = (sigma > 0) & np.isfinite(sigma)
+    return uv, sigma, fresh & aligned
 
 
 @njit(cache=True)
@@ -121,12 +129,13 @@ def _align_all(
     iterations_max: int,
     shift_max_px: float,
     correlation_min: float,
+    active: Ints,
 ) -> tuple[Array, Array]:
     sigma = np.full(len(uv), np.inf)
     for i in range(len(uv)):
         warp = np.eye(2) * min(max(scale[i], 0.5), 2.0)
         u, v, correlation, spread = align(
-            templates[i], left, uv[i, 0], uv[i, 1], warp, _TRANSLATION, iterations_max, shift_max_px
+            templates[i], left, uv[i, 0], uv[i, 1], warp, active, iterations_max, shift_max_px
         )
         if correlation >= correlation_min:
             uv[i, 0], uv[i, 1], sigma[i] = u, v, spread
