@@ -80,8 +80,8 @@ class RenderScene:
         spec.visual.map.znear, spec.visual.map.zfar = NEAR_M, FAR_M
         spec.visual.map.fogstart, spec.visual.map.fogend = 0.0, haze[1]
         spec.visual.rgba.fog = [haze[0], haze[0], haze[0], 1.0]
-        for index, size in enumerate(self._texture_sizes):
-            _add_texture(spec, index, size)
+        for index in range(len(self._texture_sizes)):
+            _add_texture(spec, index)
         for index, mesh in enumerate(self._meshes):
             _add_mesh(spec, index, mesh)
         for eye in eyes:
@@ -230,13 +230,14 @@ def _make_context(width_px: int, height_px: int) -> Any:
     return importlib.import_module(f"mujoco.{way}").GLContext(width_px, height_px)
 
 
-def _add_texture(spec: mujoco.MjSpec, index: int, size: int) -> None:
+def _add_texture(spec: mujoco.MjSpec, index: int) -> None:
+    """Add a small texture; it gets its size when the context is there, and costs no memory here."""
     spec.add_texture(
         name=f"texture{index}",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        width=size,
-        height=size,
+        width=8,
+        height=8,
     )
     material = spec.add_material(name=f"material{index}", emission=1.0, specular=0.0, shininess=0.0)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = f"texture{index}"
