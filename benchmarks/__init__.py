@@ -1,0 +1,1 @@
+"""LPET against its bare counterparts: the same inputs, in one run, side by side."""
