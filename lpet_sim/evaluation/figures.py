@@ -74,6 +74,8 @@ def plot_errors(results: Sequence[RunResult], requirement: Requirement | None = 
         _draw_errors(rows, result, colour, requirement.start_m)
     _limit(rows[0], 100 * requirement.position_ratio, "limit")
     rows[0].set_ylabel("position error\n[% of distance so far]")
+    # Estimators differ by orders of magnitude; below 0.01 % the axis is linear down to zero.
+    rows[0].set_yscale("symlog", linthresh=0.01)
     rows[0].set_ylim(bottom=0)
     for row, axis, limit in zip(rows[1:], AXES, requirement.attitude_rad, strict=True):
         _limit(row, math.degrees(limit))
