@@ -44,7 +44,9 @@ def on_ground(terrain: Terrain, x: float, y: float = 0.0, yaw: float = 0.0) -> S
     return SE3.from_rpy([0.0, 0.0, yaw], [x, y, z])
 
 
-def discs(centres: np.ndarray, R_draw_camera: np.ndarray, radii: np.ndarray) -> tuple:
+def discs(
+    centres: np.ndarray, R_draw_camera: np.ndarray, radii: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Make discs that face the camera: corners and triangles."""
     angle = np.linspace(0, 2 * np.pi, 33)[:-1]
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(32)], axis=1)

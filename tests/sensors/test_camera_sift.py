@@ -64,9 +64,14 @@ def view() -> View:
     return View(*images, depth, between, spec.true_calibration(MAST))
 
 
-def sift(image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Give keypoints [px], octaves and descriptors at OpenCV's defaults."""
-    keypoints, descriptors = cv2.SIFT_create().detectAndCompute(image, None)
+def sift(image: np.ndarray, precise: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Give keypoints [px], octaves and descriptors at OpenCV's defaults.
+
+    By default OpenCV's keypoints lie a quarter of a pixel off in u and v; on sloping ground that
+    shows as a disparity error, so that the precise upscaling is for measuring.
+    """
+    detector = cv2.SIFT_create(enable_precise_upscale=precise)
+    keypoints, descriptors = detector.detectAndCompute(image, None)
     octaves = (np.array([k.octave & 255 for k in keypoints]) + 128) % 256 - 128
     return np.array([k.pt for k in keypoints]), octaves, descriptors
 
@@ -109,9 +114,9 @@ def test_most_points_are_found_again_20_cm_on(view: View) -> None:
 
 
 def test_disparities_have_no_bias(view: View) -> None:
-    """Medians of the errors of disparity, near and far, and of rows are within 0.05 px."""
-    left, _, first = sift(view.left)
-    right, _, second = sift(view.right)
+    """Medians of the errors of disparity, near and far, and of rows are within 0.03 px."""
+    left, _, first = sift(view.left, precise=True)
+    right, _, second = sift(view.right, precise=True)
     matches = cv2.BFMatcher(crossCheck=True).match(first, second)
     query = np.array([match.queryIdx for match in matches])
     train = np.array([match.trainIdx for match in matches])
@@ -123,5 +128,5 @@ def test_disparities_have_no_bias(view: View) -> None:
     for low, high in ((0.0, 3.0), (3.0, 6.0), (6.0, 15.0)):
         ring = fair & (z > low) & (z < high)
         assert ring.sum() > 100
-        assert abs(np.median(error[ring])) < 0.05
-        assert abs(np.median(step[ring, 1])) < 0.05
+        assert abs(np.median(error[ring])) < 0.03
+        assert abs(np.median(step[ring, 1])) < 0.03
