@@ -34,7 +34,7 @@ def _ranges(measurements: Measurements) -> np.ndarray:
 
 
 def test_a_disparity_bias_brings_points_nearer_by_the_closed_form() -> None:
-    """z' = f b / (d + bias)."""
+    """Z' = f b / (d + bias)."""
     wrong = miscalibrate(_measured(), DeclaredErrorSpec(disparity_bias_px=0.2))
     disparity = STEREO.focal_px * STEREO.baseline_m / POINTS[:, 2]
     expected = STEREO.focal_px * STEREO.baseline_m / (disparity + 0.2)
@@ -42,7 +42,7 @@ def test_a_disparity_bias_brings_points_nearer_by_the_closed_form() -> None:
 
 
 def test_a_focal_error_scales_every_range() -> None:
-    """z' = (1 + e) z."""
+    """Z' = (1 + e) z."""
     wrong = miscalibrate(_measured(), DeclaredErrorSpec(focal_scale_error=0.002))
     np.testing.assert_allclose(_ranges(wrong), 1.002 * POINTS[:, 2], rtol=1e-12)
 
