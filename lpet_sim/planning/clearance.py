@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy import ndimage
 
+from lpet_sim.errors import PlanningError
 from lpet_sim.recording.arrays import Array
 from lpet_sim.spec import Spec
 from lpet_sim.terrain.box import Box
@@ -19,6 +20,9 @@ from lpet_sim.terrain.rocks import Rocks
 
 Point = tuple[float, float]
 Bools = NDArray[np.bool_]
+
+# About 2 GB while the distances are made.
+_NODES_MAX = 50_000_000
 
 
 class Ground(Protocol):
@@ -132,11 +136,15 @@ def map_clearance(terrain: Ground, box: Box, spec: RouteSpec) -> ClearanceMap:
         terrain: The terrain.
         box: What to map; obstacles just outside count too.
         spec: What an obstacle is.
+
+    Raises:
+        PlanningError: The box is too large to be mapped as finely as asked.
     """
     cell = spec.cell_m
     wide = box.grown(spec.needed_m + cell)
     x0, y0 = math.floor(wide.x_min / cell), math.floor(wide.y_min / cell)
     nx, ny = (math.ceil(wide.x_max / cell) - x0 + 1, math.ceil(wide.y_max / cell) - y0 + 1)
+    _check_size(nx, ny, spec)
     x, y = _nodes(x0, nx, cell), _nodes(y0, ny, cell)
     blocked = _outside(terrain.drivable, x, y) | _steep(terrain, x, y, spec)
     _mark_rocks(blocked, terrain.rocks(wide.grown(2.0)), x, y, spec.obstacle_height_m)
@@ -146,6 +154,16 @@ def map_clearance(terrain: Ground, box: Box, spec: RouteSpec) -> ClearanceMap:
     free = (distance_m >= spec.needed_m) & _inside(box, x, y)
     region = np.asarray(ndimage.label(free)[0], dtype=np.int32)
     return ClearanceMap(x0, y0, cell, distance_m, free, region)
+
+
+def _check_size(nx: int, ny: int, spec: RouteSpec) -> None:
+    if nx * ny > _NODES_MAX:
+        side_m = math.sqrt(_NODES_MAX) * spec.cell_m
+        raise PlanningError(
+            f"a route over {nx * spec.cell_m:.0f} x {ny * spec.cell_m:.0f} m is too far to plan at "
+            f"once with route.cell_m {spec.cell_m:g}, up to {side_m:.0f} x {side_m:.0f} m is "
+            "possible: put waypoints between, take a larger cell, or none (route: null)"
+        )
 
 
 def _nodes(first: int, count: int, cell_m: float) -> Array:
