@@ -99,7 +99,7 @@ def solve_motion(r: Array, info: Array, J: Array, weight: Array) -> tuple[Array,
                     H[a, b] += JtW[a, c] * J[i, c, b]
     for k in range(6):
         H[k, k] += 1e-12 * H[k, k] + 1e-12
-    return np.linalg.solve(H, g), H
+    return np.asarray(np.linalg.solve(H, g)), H
 
 
 @njit(cache=True)

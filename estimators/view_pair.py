@@ -16,6 +16,9 @@ from lpet_sim.recording.calibration import StereoCalibration
 from lpet_sim.recording.streams import SightingStream
 from lpet_sim.spec import Spec
 
+# Estimating and gating take turns until the same landmarks agree, whatever sample began it.
+_ROUNDS_MAX = 8
+
 
 class TwoViewSpec(Spec):
     """Parameters of the motion between two views.
@@ -139,15 +142,17 @@ def estimate_step(
     R, t, agree = two_view.ransac(
         camera, *_parts(T_start), *data, samples, spec.gate_chi2, spec.confidence
     )
-    for _ in range(2):
+    for _ in range(_ROUNDS_MAX):
         if agree.sum() < spec.inliers_min:
             return None
         R, t, x = two_view.refine(
-            camera, R, t, *data, agree * 1.0, spec.student_dof, spec.iterations_max
+            camera, R, t, *data, agree.astype(np.float64), spec.student_dof, spec.iterations_max
         )
         r, info, G, J = two_view.innovations(camera, R, t, *data, x)
         chi2 = two_view.chi_squares(r, info)
-        agree = chi2 < spec.gate_chi2
+        before, agree = agree, chi2 < spec.gate_chi2
+        if np.array_equal(before, agree):
+            break
     if agree.sum() < spec.inliers_min:
         return None
     return _step(pair, SE3(R, t), agree, chi2, info, G, J, spec.student_dof)

@@ -136,7 +136,7 @@ def _check_layout(root: Path) -> None:
 
 def _check_count(root: Path, images: int, **others: int) -> None:
     for name, count in others.items():
-        if count != images or images == 0:
+        if count != images:
             raise RecordingError(
                 f"{root} has {images} image pairs but {count} {name}: there must be one for each"
             )
@@ -146,6 +146,8 @@ def _images(root: Path) -> StereoFolder:
     left, right = (tuple(sorted((root / eye).glob("*.png"))) for eye in ("left", "right"))
     if [path.name for path in left] != [path.name for path in right]:
         raise RecordingError(f"{root}: left/ and right/ must hold PNG files of the same names")
+    if not left:
+        raise RecordingError(f"{root} has 0 image pairs: left/ and right/ must hold PNG files")
     t_s = _numbers(root / "times.txt", 1)[:, 0]
     t_ns = np.rint((t_s - t_s[:1]) * NS_PER_S).astype(np.int64)
     return StereoFolder(t_ns, left, right)
@@ -153,7 +155,7 @@ def _images(root: Path) -> StereoFolder:
 
 def _numbers(path: Path, columns: int) -> Array:
     try:
-        return np.loadtxt(path, ndmin=2).reshape(-1, columns)
+        return np.array(path.read_text().split(), dtype=float).reshape(-1, columns)
     except (ValueError, OSError) as error:
         raise RecordingError(
             f"cannot read {path}: {error}; {columns} numbers a row are expected"

@@ -158,4 +158,5 @@ def align(
     for k in range(len(active)):
         if active[k] % 3 == 0:
             worst = max(worst, H_inv[k, k])
-    return u + W[0, 2], v + W[1, 2], correlation, np.sqrt(spread * worst)
+    centre_u, centre_v = float(u + W[0, 2]), float(v + W[1, 2])
+    return centre_u, centre_v, float(correlation), float(np.sqrt(spread * worst))

@@ -29,7 +29,7 @@ class Features:
         angle_rad: Orientations [rad], Shape (n,), float32.
         response: Contrasts, Shape (n,), float32.
         octave: Octaves, -1 the doubled image, Shape (n,), int64.
-        descriptor: Shape (n, 128), float32, of unit length where root descriptors were asked for.
+        descriptor: Of unit length, Shape (n, 128), float32.
     """
 
     uv_px: Floats
@@ -91,7 +91,7 @@ class SiftDetector:
             np.deg2rad(table[:, 3]),
             table[:, 4],
             _signed_octave(octave),
-            _root(descriptor) if self._spec.root else descriptor,
+            _unit_length(descriptor, self._spec.root),
         )
 
     def _to_uint8(self, image: Image) -> NDArray[np.uint8]:
@@ -119,7 +119,9 @@ def _signed_octave(packed: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.where(low < 128, low, low - 256)
 
 
-def _root(descriptor: Floats) -> Floats:
-    """Map SIFT to RootSIFT: the Hellinger distance becomes the Euclidean one."""
-    total = np.maximum(descriptor.sum(axis=1, keepdims=True), 1e-9)
-    return np.sqrt(descriptor / total)
+def _unit_length(descriptor: Floats, root: bool) -> Floats:
+    """Scale descriptors to unit length; the root makes the Hellinger distance a Euclidean one."""
+    if root:
+        descriptor = np.sqrt(descriptor)
+    length = np.linalg.norm(descriptor, axis=1, keepdims=True)
+    return np.asarray(descriptor / np.maximum(length, 1e-9), dtype=np.float32)

@@ -22,6 +22,7 @@ Ints = NDArray[np.int64]
 Image = NDArray[Any]
 
 _GRID_CELLS = 8
+_COPRIME = 27
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,9 @@ def spread(seen: Gallery, calibration: StereoCalibration) -> Ints:
     starts = np.searchsorted(key[by_cell], key[by_cell])
     rank = np.empty(len(key), np.int64)
     rank[by_cell] = np.arange(len(key)) - starts
-    return np.lexsort((seen.landmark_id, -seen.reported, rank))
+    # Cells take turns in an order that jumps about the image, for a list shorter than the grid.
+    turn = key * _COPRIME % _GRID_CELLS**2
+    return np.lexsort((seen.landmark_id, turn, -seen.reported, rank))
 
 
 def sight(

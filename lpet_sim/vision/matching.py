@@ -36,6 +36,7 @@ def mutual_matches(
     window: NDArray[np.float64],
     scale_ratio_max: float,
     ratio_max: float,
+    distance_max: float,
 ) -> Ints:
     """Match two sets of features within a window of displacement.
 
@@ -52,6 +53,7 @@ def mutual_matches(
         window: (u_min, u_max, v_min, v_max) of the displacement ``uv_b - uv_a`` [px].
         scale_ratio_max: Largest ratio of the two sizes.
         ratio_max: Largest ratio of the distances to the best and second-best descriptor.
+        distance_max: Largest distance of the two descriptors.
 
     Returns:
         For each a the row in b, or -1, Shape (n,).
@@ -75,12 +77,26 @@ def mutual_matches(
                 _offer(best_a, row_a, second_a, i, j, d, uv_b)
             if d < second_b[j]:
                 _offer(best_b, row_b, second_b, j, i, d, uv_a)
-    limit = ratio_max**2
-    out = np.full(n, -1)
-    for i in range(n):
+    limits = distance_max**2, ratio_max**2
+    return _accept(best_a, row_a, second_a, row_b, second_b, limits)
+
+
+@njit(cache=True)
+def _accept(
+    best_a: NDArray[np.float64],
+    row_a: Ints,
+    second_a: NDArray[np.float64],
+    row_b: Ints,
+    second_b: NDArray[np.float64],
+    limits: tuple[float, float],
+) -> Ints:
+    """Keep who is near, mutual and distinct: for each a the row in b, or -1."""
+    out = np.full(len(row_a), -1)
+    for i in range(len(row_a)):
         j = row_a[i]
-        distinct = j >= 0 and best_a[i] < limit * second_a[i] and best_a[i] < limit * second_b[j]
-        if distinct and row_b[j] == i:
+        if j < 0 or row_b[j] != i or best_a[i] > limits[0]:
+            continue
+        if best_a[i] < limits[1] * min(second_a[i], second_b[j]):
             out[i] = j
     return out
 

@@ -39,6 +39,8 @@ class StereoMatchSpec(Spec):
         scale_ratio_max: Largest ratio of the two keypoints' sizes.
         ratio_max: Largest ratio of the distances to the best and the second-best descriptor
             (Lowe 2004, sec. 7.1).
+        distance_max: Largest distance of the two descriptors, which are of unit length; within an
+            epipolar band there are too few candidates for the ratio alone to tell.
     """
 
     epipolar_px: float = Field(default=1.5, gt=0)
@@ -46,6 +48,7 @@ class StereoMatchSpec(Spec):
     disparity_min_px: float = Field(default=0.5, gt=0)
     scale_ratio_max: float = Field(default=1.5, ge=1)
     ratio_max: float = Field(default=0.85, gt=0, le=1)
+    distance_max: float = Field(default=0.5, gt=0)
 
 
 class TemporalMatchSpec(Spec):
@@ -57,6 +60,7 @@ class TemporalMatchSpec(Spec):
         search_height: Half the height of the search window, as a share of the image's height.
         scale_ratio_max: Largest ratio of the keypoints' sizes.
         ratio_max: Largest ratio of the distances to the best and second-best descriptor.
+        distance_max: Largest distance of the two descriptors, which are of unit length.
         gate_px: Largest distance from where the common motion says that a landmark should be.
         matches_min: Fewest matches with the last image that a common motion is fitted to.
     """
@@ -66,6 +70,7 @@ class TemporalMatchSpec(Spec):
     search_height: float = Field(default=0.15, gt=0)
     scale_ratio_max: float = Field(default=1.7, ge=1)
     ratio_max: float = Field(default=0.85, gt=0, le=1)
+    distance_max: float = Field(default=0.6, gt=0)
     gate_px: float = Field(default=5.0, gt=0)
     matches_min: int = Field(default=8, ge=3)
 

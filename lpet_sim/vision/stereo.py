@@ -67,6 +67,7 @@ def match_stereo(
         window,
         spec.scale_ratio_max,
         spec.ratio_max,
+        spec.distance_max,
     )
     rows = np.flatnonzero(match >= 0)
     rows = rows[np.sort(np.unique(left.uv_px[rows], axis=0, return_index=True)[1])]

@@ -85,6 +85,7 @@ def _match(
         np.array([-u, u, -v, v]),
         spec.scale_ratio_max,
         spec.ratio_max,
+        spec.distance_max,
     )
 
 
