@@ -31,6 +31,7 @@ from lpet_sim.sweep.miscalibration import miscalibrate
 from lpet_sim.sweep.score import attribute_dead_reckoning, estimate_recording, score_recording
 from lpet_sim.sweep.simulate import simulate
 from lpet_sim.sweep.traverse import TraverseSpec
+from scenarios import first_traverse
 
 Row = dict[str, Any]
 
@@ -41,14 +42,13 @@ COMMAND = "python -m scenarios.experiments"
 
 
 def demo_spec(quick: bool) -> TraverseSpec:
-    """Give the demo's traverse without keeping its images; a few metres of it for --quick."""
+    """Give the demo's traverse without keeping its images; a straight metre for --quick."""
     spec = TraverseSpec.from_yaml(SCENARIOS / "demo.yaml")
+    if quick:
+        spec = first_traverse.quick(spec, waypoints_m=((0.0, 0.0), (1.0, 0.0)), slip_s=5.0)
+        spec = spec.model_copy(update={"route": None})
     images = spec.images and spec.images.model_copy(update={"keep_every": 0})
-    spec = spec.model_copy(update={"images": images})
-    if not quick:
-        return spec
-    drive = spec.drive.model_copy(update={"waypoints_m": ((0.0, 0.0), (2.0, 0.0))})
-    return spec.model_copy(update={"drive": drive, "name": "quick"})
+    return spec.model_copy(update={"images": images})
 
 
 def run_seed(spec: TraverseSpec, seed: int) -> list[Row]:
@@ -146,7 +146,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, help="docs/results; out/experiments with --quick")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--quick", action="store_true", help="two seeds, two metres")
+    parser.add_argument("--quick", action="store_true", help="two seeds, a metre")
     options = parser.parse_args()
     spec = demo_spec(options.quick)
     seeds = SEEDS[:2] if options.quick else SEEDS

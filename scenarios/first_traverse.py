@@ -11,23 +11,32 @@ from pathlib import Path
 from rich.console import Console
 
 from lpet_sim.rover.spec import DriveSpec, ForcedSlip
-from lpet_sim.sensors.camera_spec import LOCCAM_FOCAL_PX, StereoCameraSpec
+from lpet_sim.sensors.camera_spec import LOCCAM_FOCAL_PX, GroundDetailSpec, StereoCameraSpec
 from lpet_sim.study import SCENARIOS, run_traverse
 from lpet_sim.sweep.report import score_tables
 from lpet_sim.sweep.traverse import ImagesSpec, TraverseSpec
 
 
-def quick(spec: TraverseSpec) -> TraverseSpec:
+def quick(
+    spec: TraverseSpec,
+    waypoints_m: tuple[tuple[float, float], ...] = ((0.0, 0.0), (3.0, 0.5)),
+    slip_s: float = 20.0,
+) -> TraverseSpec:
     """Shorten a traverse to a few metres at twice the speed, and its images to a sixth."""
     drive = DriveSpec(
-        waypoints_m=((0.0, 0.0), (3.0, 0.5)),
+        waypoints_m=waypoints_m,
         speed_mps=2 * spec.drive.speed_mps,
         settle_s=2.0,
-        forced_slips=(ForcedSlip(start_s=20.0),),
+        forced_slips=(ForcedSlip(start_s=slip_s),),
     )
-    stereo = StereoCameraSpec(width_px=480, height_px=360, focal_px=LOCCAM_FOCAL_PX * 480 / 1024)
+    stereo = StereoCameraSpec(
+        width_px=480,
+        height_px=360,
+        focal_px=LOCCAM_FOCAL_PX * 480 / 1024,
+        ground=GroundDetailSpec(supersampling=1, texel_m=0.00625, cell_m=0.08, levels=7),
+    )
     sensors = spec.sensors.model_copy(update={"stereo": stereo})
-    images = ImagesSpec(period_s=2.0)
+    images = ImagesSpec(period_s=3.0)
     changed = {"name": "quick", "drive": drive, "sensors": sensors, "images": images}
     return spec.model_copy(update=changed)
 

@@ -71,7 +71,8 @@ def main() -> None:
     print(sight_recording(run, run, FrontEndSpec()))
     recording = read_recording(run)
     table = Table(title="end error: share of the distance, rotation")
-    for heading in ("estimator", *(f"from image {start}" for start in STARTS), "images not seen"):
+    table.add_column("estimator", no_wrap=True)
+    for heading in (*(f"from image {start}" for start in STARTS), "images not seen"):
         table.add_column(heading)
     for seed in range(1 if options.quick else 5):
         estimate = frame_to_frame(recording, seed)

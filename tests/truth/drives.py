@@ -20,9 +20,8 @@ from lpet_sim.terrain.spec import ReliefSpec, RockAbundanceSpec, TerrainSpec
 
 SLIP = ForcedSlip(start_s=30.0, duration_s=5.0)
 SPEED_MPS = 0.05
-STEREO = StereoCameraSpec(
-    width_px=480, height_px=360, focal_px=377.0, ground=GroundDetailSpec(supersampling=1)
-)
+GROUND = GroundDetailSpec(supersampling=1, texel_m=0.00625, cell_m=0.08, levels=7)
+STEREO = StereoCameraSpec(width_px=480, height_px=360, focal_px=377.0, ground=GROUND)
 RELIEF_SLOPE_RAD = math.radians(3.0)
 
 
