@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from rich.table import Table
+from rich.text import Text
 
 from lpet_sim.evaluation import Requirement
 from lpet_sim.evaluation.tables import attribution_table, result_table, segment_table
@@ -33,19 +34,26 @@ def terrain_tables(summary: TerrainSummary) -> Iterator[Table]:
     facts = Table(title=f"{summary.name}: {summary.area_m2:g} m2")
     facts.add_column("quantity")
     facts.add_column("value", justify="right")
-    facts.add_row("relief [m]", f"{summary.relief_m:.2f}")
-    facts.add_row("RMS slope at 1 m [deg]", f"{math.degrees(summary.rms_slope_1m_rad):.2f}")
-    for name, share in summary.soil_shares:
-        facts.add_row(f"soil '{name}' [%]", f"{100 * share:.1f}")
+    for quantity, value in _terrain_facts(summary):
+        facts.add_row(Text(quantity), value)
     yield facts
     if summary.rock_bins:
         yield _rock_table(summary)
 
 
+def _terrain_facts(summary: TerrainSummary) -> Iterator[tuple[str, str]]:
+    yield "relief [m]", f"{summary.relief_m:.2f}"
+    yield "RMS slope at 1 m [deg]", f"{math.degrees(summary.rms_slope_1m_rad):.2f}"
+    for name, share in summary.soil_shares:
+        yield f"soil '{name}' [%]", f"{100 * share:.1f}"
+    yield "covered by rocks [%]", f"{100 * summary.rock_cover:.2f}"
+    yield "covered by the size law [%]", f"{100 * summary.rock_cover_expected:.2f}"
+
+
 def _rock_table(summary: TerrainSummary) -> Table:
     rocks = Table(title="rocks by diameter")
     for heading in ("from [m]", "to [m]", "found", "size law"):
-        rocks.add_column(heading, justify="right")
+        rocks.add_column(Text(heading), justify="right")
     for rock_bin in summary.rock_bins:
         rocks.add_row(
             f"{rock_bin.diameter_min_m:.2f}",
