@@ -1,0 +1,168 @@
+"""The scenarios run as they stand, and the README says what the command understands."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer.main
+import yaml
+
+from estimators import ESTIMATORS
+from lpet_sim import cli
+from lpet_sim.datasets import data_folder
+from lpet_sim.errors import LpetError
+from lpet_sim.recording.reader import read_recording
+from lpet_sim.sweep.simulate import simulate
+from lpet_sim.sweep.traverse import TraverseSpec
+from tests.command import TINY
+
+ROOT = Path(__file__).parents[1]
+SCENARIOS = ROOT / "scenarios"
+README = (ROOT / "README.md").read_text()
+
+
+def run_quick(script: str, folder: Path, *more: str) -> str:
+    """Run a scenario in a folder of its own and give what it prints."""
+    command = [sys.executable, "-m", f"scenarios.{script.removesuffix('.py')}", "--quick", *more]
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "COLUMNS": "120"},
+        timeout=400,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "Traceback" not in done.stderr
+    return done.stdout
+
+
+def written_by(printed: str) -> list[Path]:
+    """Give the files that a scenario says it has written."""
+    return [Path(found) for found in re.findall(r"^wrote (\S+)", printed, re.MULTILINE)]
+
+
+def test_the_first_traverse_ends_in_a_table_and_three_files(tmp_path: Path) -> None:
+    """A short drive among rocks is recorded, estimated by every estimator, scored and drawn."""
+    printed = run_quick("first_traverse.py", tmp_path, "--out", str(tmp_path / "first"))
+    assert all(word in printed for word in ("frame_to_frame", "verdict", "forced_slip"))
+    run, *pictures = written_by(printed)
+    assert len(pictures) == 2
+    assert all(path.stat().st_size > 10_000 for path in pictures)
+    recording = read_recording(run)
+    assert recording.truth is not None
+    assert recording.truth.events[-1].kind == "goal"
+
+
+def test_a_kilometre_begins(tmp_path: Path) -> None:
+    """The first metres of the kilometre are driven, with their memory and time."""
+    printed = run_quick("kilometre.py", tmp_path, "--out", str(tmp_path / "km"))
+    assert "times real time" in printed and "MB" in printed
+    recording = read_recording(written_by(printed)[0])
+    assert recording.truth is not None
+    assert recording.truth.trajectory.arc_length_m[-1] > 19.0
+
+
+def test_real_stereo_is_localized(tmp_path: Path) -> None:
+    """A hundred real pairs go through the same front end and estimator."""
+    try:
+        data_folder()
+    except LpetError as error:
+        pytest.skip(str(error))
+    printed = run_quick("real_stereo.py", tmp_path, "--out", str(tmp_path / "real"))
+    assert "frame_to_frame, seed 0" in printed
+    assert "from image 20" in printed
+
+
+def test_the_experiments_fill_their_tables(tmp_path: Path) -> None:
+    """Two short drives give a row for each seed, arm and estimator."""
+    printed = run_quick("experiments.py", tmp_path, "--out", str(tmp_path), "--workers", "1")
+    table, summary = written_by(printed)
+    rows = list(csv.DictReader(table.open()))
+    assert len(rows) == 2 * (len(ESTIMATORS) + 1)
+    assert {row["arm"] for row in rows} == {"true calibration", "wrong calibration"}
+    assert "forced_slip" in summary.read_text()
+
+
+@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_scenario_file_is_a_traverse(path: Path) -> None:
+    """It loads, is called what its file is called, and goes to YAML and back unchanged."""
+    spec = TraverseSpec.from_yaml(path)
+    assert spec.name == path.stem
+    assert TraverseSpec.from_mapping(yaml.safe_load(yaml.safe_dump(spec.to_mapping()))) == spec
+
+
+def test_every_scenario_is_run_by_a_test() -> None:
+    """A new script cannot be forgotten."""
+    here = Path(__file__).read_text()
+    scripts = {path.name for path in SCENARIOS.glob("*.py")} - {"__init__.py"}
+    assert [script for script in sorted(scripts) if f'run_quick("{script}"' not in here] == []
+
+
+def blocks(language: str) -> list[str]:
+    """Give the README's code blocks of a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+
+
+def parse_lpet(words: list[str]) -> None:
+    """Parse a command line of ``lpet`` without running it; it raises what the command would."""
+    command = typer.main.get_command(cli.app)
+    while hasattr(command, "commands"):
+        name, *words = words
+        command = command.commands[name]
+    command.make_context("lpet", words)
+
+
+def test_the_readme_speaks_the_language_of_the_command() -> None:
+    """Each line parses: lpet with its options, make with its targets, scripts that are there."""
+    lines = [
+        shlex.split(line, comments=True) for block in blocks("sh") for line in block.split("\n")
+    ]
+    words_of = [words for words in lines if words]
+    assert sum(words[0] == "lpet" for words in words_of) >= 8
+    targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    for first, *words in words_of:
+        if Path(first).name == "lpet":
+            parse_lpet(words)
+        elif first == "make":
+            assert set(words) <= targets
+        else:
+            assert first in ("git", "cd") or Path(first).name.startswith("python"), first
+    assert set(re.findall(r"`make (\w+)`", README)) <= targets
+
+
+def test_a_line_that_is_wrong_would_be_seen() -> None:
+    """The parser used above refuses an option and a command that are not there."""
+    with pytest.raises(Exception, match="No such option"):
+        parse_lpet(["evaluate", "run.rrd", "--strict"])
+    with pytest.raises(KeyError, match="fly"):
+        parse_lpet(["fly"])
+
+
+def test_the_readme_names_files_and_estimators_that_are_there() -> None:
+    """Paths in code marks exist, the table has every estimator, the YAML is a traverse."""
+    named = set(re.findall(r"`((?:scenarios|lpet_sim|tests|models|docs)/[\w./-]*)`", README))
+    assert named
+    assert sorted(path for path in named if not (ROOT / path).exists()) == []
+    assert [name for name in ESTIMATORS if f"`{name}`" not in README] == []
+    traverses = [yaml.safe_load(text) for text in blocks("yaml")]
+    assert traverses
+    for traverse in traverses:
+        TraverseSpec.from_mapping(traverse)
+
+
+def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a recording of the name that it uses."""
+    monkeypatch.chdir(tmp_path)
+    simulate(TraverseSpec.from_mapping(yaml.safe_load(TINY)), 1, tmp_path / "run.rrd")
+    assert blocks("python")
+    for text in blocks("python"):
+        exec(compile(text, "README.md", "exec"), {})
