@@ -52,9 +52,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out/kilometre"))
     parser.add_argument("--length", type=float, default=1000.0, help="metres to drive")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--quick", action="store_true", help="20 m only")
+    parser.add_argument("--quick", action="store_true", help="10 m only")
     options = parser.parse_args()
-    length_m = 20.0 if options.quick else options.length
+    length_m = 10.0 if options.quick else options.length
     spec = TraverseSpec.from_yaml(SCENARIOS / "kilometre.yaml")
     corners = ((-length_m / 2, 0.0), (length_m / 2, 0.0))
     drive = spec.drive.model_copy(update={"waypoints_m": corners})
