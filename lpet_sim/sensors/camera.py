@@ -109,7 +109,7 @@ class StereoRenderer:
         self.close()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _average(samples, step, R_world_camera, intrinsics, sky, out):  # type: ignore[no-untyped-def]
     """Average the samples of each pixel, the sky put in where nothing was drawn."""
     rows, columns = out.shape

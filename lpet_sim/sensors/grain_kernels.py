@@ -22,7 +22,7 @@ CRACK_M = 0.006
 """Typical half-width of a crack [m]. A choice."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def smooth_noise(key, level, x, y):  # type: ignore[no-untyped-def]
     """Interpolate hashed nodes of the unit grid smoothly; values in -1..1."""
     ix, iy = math.floor(x), math.floor(y)
@@ -35,7 +35,7 @@ def smooth_noise(key, level, x, y):  # type: ignore[no-untyped-def]
     return 2.0 * (low + fy * (high - low)) - 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def stoniness(key, x, y):  # type: ignore[no-untyped-def]
     """Say how stony the ground is, 0 (bare sand) to 2, with patches of metres and decimetres."""
     wide = smooth_noise(key, 900, x / 3.1, y / 3.1)
@@ -44,7 +44,7 @@ def stoniness(key, x, y):  # type: ignore[no-untyped-def]
     return min(max(0.8 + 0.9 * wide + 0.7 * middle + 0.5 * narrow, 0.0), 2.0)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def stoniness_at(key, x0, y0, cell, rows, columns):  # type: ignore[no-untyped-def]
     """Give `stoniness` at the nodes ``((x0 + j), (y0 + i)) * cell``, Shape (rows, columns)."""
     out = np.empty((rows, columns))
@@ -54,7 +54,7 @@ def stoniness_at(key, x0, y0, cell, rows, columns):  # type: ignore[no-untyped-d
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def add_grain(height, x0, y0, texel, wavelength, amplitude, key):  # type: ignore[no-untyped-def]
     """Add one octave of smooth noise; texel (i, j) is at ``(x0 + j + 0.5, y0 + i + 0.5) texel``."""
     rows, columns = height.shape
@@ -84,7 +84,7 @@ def add_grain(height, x0, y0, texel, wavelength, amplitude, key):  # type: ignor
             height[i, j] += 2.0 * amplitude * (low + fy * (high - low))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def add_pebbles(height, tone, x0, y0, texel, diameter, cover, key):  # type: ignore[no-untyped-def]
     """Lay one octave of pebbles: a hashed cell of ``3 diameter`` holds one or none.
 
@@ -111,7 +111,7 @@ def add_pebbles(height, tone, x0, y0, texel, diameter, cover, key):  # type: ign
                 _lay(height, tone, px / texel - x0, py / texel - y0, texel, radius, state)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _lay(height, tone, column, row, texel, radius, state):  # type: ignore[no-untyped-def]
     """Lay one blunt stone cut by four slanted planes, the albedo its own."""
     reach = int(radius / texel) + 2
@@ -132,7 +132,7 @@ def _lay(height, tone, column, row, texel, radius, state):  # type: ignore[no-un
                 tone[i, j] = shade
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def add_ripples(height, loose, x0, y0, cell, key):  # type: ignore[no-untyped-def]
     """Add wind ripples where the soil is loose: curved, forked crests, in patches.
 
@@ -161,7 +161,7 @@ def add_ripples(height, loose, x0, y0, cell, key):  # type: ignore[no-untyped-de
             height[i, j] += RIPPLE_HEIGHT_M * strength * crest * math.sqrt(crest)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def add_plates(  # type: ignore[no-untyped-def]
     height, tone, firm, factor, x0, y0, texel, key
 ):
@@ -200,7 +200,7 @@ def add_plates(  # type: ignore[no-untyped-def]
             height[i, j] += rise * (0.006 + tilt * dx * PLATE_M)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _nearest_plate(x, y, key):  # type: ignore[no-untyped-def]
     """Give the offset to the nearest point, half the second's lead over it, and its state."""
     ix, iy = math.floor(x), math.floor(y)

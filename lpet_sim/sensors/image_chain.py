@@ -65,7 +65,7 @@ def vignetting(height_px: int, width_px: int, focal_px: float, strength: float) 
     return out
 
 
-@njit(cache=True, fastmath=False)
+@njit(cache=True, nogil=True, fastmath=False)
 def _digitise(  # type: ignore[no-untyped-def]
     image, gain, normal, scale, full_well, noise, root, top, out
 ):

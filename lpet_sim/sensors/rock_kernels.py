@@ -12,7 +12,7 @@ from lpet_sim.terrain.hashing import tile_state, uniform
 _BELOW_GROUND_M = 0.02
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _solid_noise(key, x, y, z):  # type: ignore[no-untyped-def]
     """Interpolate hashed nodes of the unit lattice; values in -1..1."""
     ix, iy, iz = math.floor(x), math.floor(y), math.floor(z)
@@ -30,7 +30,7 @@ def _solid_noise(key, x, y, z):  # type: ignore[no-untyped-def]
     return 2.0 * total - 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _grain(key, p, size):  # type: ignore[no-untyped-def]
     """Sum two octaves of solid noise, the longer of wavelength ``size``."""
     total = 0.0
@@ -40,7 +40,7 @@ def _grain(key, p, size):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def paint_rock(  # type: ignore[no-untyped-def]
     image, corners, places, normals, albedo, height, grain, rough, sun, ambient, key
 ):
@@ -91,7 +91,7 @@ def paint_rock(  # type: ignore[no-untyped-def]
                 )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _light(p, normal, height, grain, rough, sun, ambient, key):  # type: ignore[no-untyped-def]
     """Light one point of a facet, with its tone."""
     here = _grain(key, p, grain)

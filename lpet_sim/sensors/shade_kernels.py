@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def shadow_height(height, shift, drop):  # type: ignore[no-untyped-def]
     """Give the height below which the sun is hidden.
 
@@ -29,7 +29,7 @@ def shadow_height(height, shift, drop):  # type: ignore[no-untyped-def]
     return shade
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def raise_triangles(height, corners, x0, y0, cell):  # type: ignore[no-untyped-def]
     """Lift a height map to the upper sides of triangles, Shape (f, 3, 3), node by node."""
     rows, columns = height.shape
@@ -58,7 +58,7 @@ def raise_triangles(height, corners, x0, y0, cell):  # type: ignore[no-untyped-d
                     height[i, j] = max(height[i, j], z)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _between(field, y, x):  # type: ignore[no-untyped-def]
     """Interpolate a field of nodes at a fractional row and column."""
     i, j = int(y), int(x)
@@ -68,7 +68,7 @@ def _between(field, y, x):  # type: ignore[no-untyped-def]
     return low + fy * (high - low)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def light_texels(  # type: ignore[no-untyped-def]
     albedo,
     fine,
@@ -125,7 +125,7 @@ def light_texels(  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def halve(image):  # type: ignore[no-untyped-def]
     """Average 2 x 2 texels: one step down the pyramid."""
     rows, columns = image.shape[0] // 2, image.shape[1] // 2

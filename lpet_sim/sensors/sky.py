@@ -26,7 +26,7 @@ def sky_coefficients(sun: SunSpec) -> Array:
     return np.array([*sun.direction, HORIZON_RADIANCE, ZENITH_SHARE, GLOW])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def sky_radiance(R_world_camera, x, y, sky):  # type: ignore[no-untyped-def]
     """Give the sky's radiance in the direction (x, y, 1) of the camera.
 

@@ -73,7 +73,7 @@ def build_craters(spec: CraterSpec, rng: np.random.Generator) -> CraterField:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def crater_profile(r, depth, rim, softness):  # type: ignore[no-untyped-def]
     """Give height and slope of a crater at a distance from its centre.
 
@@ -102,7 +102,7 @@ def crater_profile(r, depth, rim, softness):  # type: ignore[no-untyped-def]
     return height, m * bowl_slope + (1.0 - m) * ejecta_slope
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _draw(state, index, level, form, out):  # type: ignore[no-untyped-def]
     """Draw crater number index of a tile: (x, y) in the tile, radius, depth, rim, softness."""
     low, high, side = level[0], level[1], level[2]
@@ -117,7 +117,7 @@ def _draw(state, index, level, form, out):  # type: ignore[no-untyped-def]
     out[5] = (0.05 + 0.4 * (1.0 - freshness)) * out[3]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _gather(key, number, level, form, ix, iy, found):  # type: ignore[no-untyped-def]
     """List the craters of a tile and its eight neighbours, always in the same order."""
     total = 0
@@ -132,7 +132,7 @@ def _gather(key, number, level, form, ix, iy, found):  # type: ignore[no-untyped
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _sum_level(xy, key, number, level, form, out):  # type: ignore[no-untyped-def]
     """Add the craters of one octave: (z, dz/dx, dz/dy), Shape (n, 3)."""
     found = np.empty((9 * MAX_COUNT, 6))
@@ -146,7 +146,7 @@ def _sum_level(xy, key, number, level, form, out):  # type: ignore[no-untyped-de
             _add_crater(xy[i, 0] - found[k, 0], xy[i, 1] - found[k, 1], found[k], out[i])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add_crater(dx, dy, crater, out):  # type: ignore[no-untyped-def]
     """Add one crater at an offset from its centre."""
     squared = dx * dx + dy * dy

@@ -211,7 +211,7 @@ def _fade(x: NDArray[Any], low: float, high: float, width: float) -> tuple[Array
     return t**3 * (t * (6.0 * t - 15.0) + 10.0), sign * 30.0 * t**2 * (1.0 - t) ** 2
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _evaluate(xy, coefficients, first, pixel, out):  # type: ignore[no-untyped-def]
     """Evaluate a bicubic spline and its gradient; zero outside its nodes."""
     ny, nx = coefficients.shape

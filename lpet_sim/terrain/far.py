@@ -61,7 +61,7 @@ def build_hills(spec: FarReliefSpec, rng: np.random.Generator) -> Hills:
     return Hills(rows[distance > spec.clear_radius_m + WIDEST * radius], spec.clear_radius_m)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _outline(angle, row):  # type: ignore[no-untyped-def]
     """Give the foot's distance over the radius in a direction, and its derivative."""
     size, slope = 1.0, 0.0
@@ -72,7 +72,7 @@ def _outline(angle, row):  # type: ignore[no-untyped-def]
     return size, slope
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _profile(t, mesa):  # type: ignore[no-untyped-def]
     """Give the height over the hill's height and its slope at t, 0 at the centre, 1 at the foot."""
     if mesa:
@@ -81,7 +81,7 @@ def _profile(t, mesa):  # type: ignore[no-untyped-def]
     return (1.0 - t * t) ** 2, -4.0 * t * (1.0 - t * t)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add_hill(dx, dy, row, out):  # type: ignore[no-untyped-def]
     """Add one hill at an offset from its centre: with t = d / (radius outline(angle))."""
     d = math.sqrt(dx * dx + dy * dy)
@@ -99,7 +99,7 @@ def _add_hill(dx, dy, row, out):  # type: ignore[no-untyped-def]
     out[2] += (along * dy + across * dx) / d
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _sum_hills(xy, rows, clear_radius, out):  # type: ignore[no-untyped-def]
     """Add every hill: (z, dz/dx, dz/dy), Shape (n, 3)."""
     for i in range(len(xy)):

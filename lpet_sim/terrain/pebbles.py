@@ -84,7 +84,7 @@ def _mean_albedo(
     return float(relative.mean())
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _gather(key, number, level, contrast, ix, iy, found):  # type: ignore[no-untyped-def]
     """List the pebbles of a tile and its neighbours: (x, y, radius, cos, sin, flattening, tone)."""
     total = 0
@@ -104,7 +104,7 @@ def _gather(key, number, level, contrast, ix, iy, found):  # type: ignore[no-unt
     return total
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _cover(dx, dy, row, texel):  # type: ignore[no-untyped-def]
     """Give how much of a texel lies on the ellipse of a pebble, 0 to 1."""
     u = row[3] * dx + row[4] * dy
@@ -112,7 +112,7 @@ def _cover(dx, dy, row, texel):  # type: ignore[no-untyped-def]
     return min(max((row[2] - math.sqrt(u * u + v * v)) / texel + 0.5, 0.0), 1.0)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _lit(dx, dy, row, light, texel):  # type: ignore[no-untyped-def]
     """Give what a pebble and its shadow multiply the albedo by at an offset from its centre."""
     on = _cover(dx, dy, row, texel)
@@ -126,7 +126,7 @@ def _lit(dx, dy, row, light, texel):  # type: ignore[no-untyped-def]
     return on * pebble + (1.0 - on) * (1.0 - SHADOW_DEPTH * shaded)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _draw_level(xy, key, number, level, light, texel, out):  # type: ignore[no-untyped-def]
     """Draw the pebbles of one octave of size over a relative albedo."""
     found = np.empty((9 * MAX_COUNT, 7))

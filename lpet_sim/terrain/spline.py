@@ -8,7 +8,7 @@ from numba import njit
 TILE = 512  # cells along a tile's side, a power of two
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def weights(t):  # type: ignore[no-untyped-def]
     """Give the four cubic B-spline weights at the fraction t of a cell."""
     s = 1.0 - t
@@ -18,14 +18,14 @@ def weights(t):  # type: ignore[no-untyped-def]
     return w0, w1, 1.0 - w0 - w1 - w3, w3
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def slopes(t):  # type: ignore[no-untyped-def]
     """Give the derivatives of the four weights with respect to t."""
     s = 1.0 - t
     return -0.5 * s * s, t * (1.5 * t - 2.0), s * (2.0 - 1.5 * s), 0.5 * t * t
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _blend(tile, iu, iv, a0, a1, a2, a3, b0, b1, b2, b3):  # type: ignore[no-untyped-def]
     """Sum sixteen coefficients of a periodic tile, weighted a along u and b along v."""
     m = TILE - 1
@@ -38,7 +38,7 @@ def _blend(tile, iu, iv, a0, a1, a2, a3, b0, b1, b2, b3):  # type: ignore[no-unt
     return b0 * s0 + b1 * s1 + b2 * s2 + b3 * s3
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _locate(x, y, frame):  # type: ignore[no-untyped-def]
     """Give a point's coordinates in a tile [cells]."""
     u = (frame[1] * x + frame[2] * y) / frame[0] + frame[3]
@@ -46,7 +46,7 @@ def _locate(x, y, frame):  # type: ignore[no-untyped-def]
     return u, v
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def sum_heights(xy, tiles, frames, first, out):  # type: ignore[no-untyped-def]
     """Add the height of every band from the first on, Shape (n,)."""
     for i in range(len(xy)):
@@ -60,7 +60,7 @@ def sum_heights(xy, tiles, frames, first, out):  # type: ignore[no-untyped-def]
         out[i] += z
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def sum_gradients(xy, tiles, frames, out):  # type: ignore[no-untyped-def]
     """Add the gradient of every band, Shape (n, 2)."""
     for i in range(len(xy)):

@@ -20,7 +20,7 @@ _MOVED_PX = 0.003
 _NOISE_FLOOR = 1e-6
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _bilinear(image: Floats, u: float, v: float) -> float:
     i, j = int(v), int(u)
     dv, du = v - i, u - j
@@ -29,14 +29,14 @@ def _bilinear(image: Floats, u: float, v: float) -> float:
     return top + dv * (bottom - top)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def inside(image: Floats, u: float, v: float, reach: float) -> bool:
     """Tell whether a square patch of that reach [px] lies in the image with a pixel to spare."""
     h, w = image.shape
     return reach + 1 <= u < w - reach - 2 and reach + 1 <= v < h - reach - 2
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def sample(image: Floats, u: float, v: float, half: int, warp: Array) -> Floats:
     """Sample a patch around (u, v) with a linear warp, Shape (2 half + 1, 2 half + 1).
 
@@ -56,7 +56,7 @@ def sample(image: Floats, u: float, v: float, half: int, warp: Array) -> Floats:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def steepest_descent(template: Floats, active: NDArray[np.int64]) -> tuple[Array, Array, Array]:
     """Linearise a template in the active affine parameters, gain and offset projected out.
 
@@ -88,7 +88,7 @@ def steepest_descent(template: Floats, active: NDArray[np.int64]) -> tuple[Array
     return flat, images, images @ images.T
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def normalise(flat: Array, images: Array) -> None:
     """Bring a patch to zero mean and unit length, and its derivatives with it, in place."""
     flat -= flat.mean()
@@ -100,7 +100,7 @@ def normalise(flat: Array, images: Array) -> None:
         images[k] /= length
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def align(
     template: Floats,
     image: Floats,

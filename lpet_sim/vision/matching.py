@@ -16,7 +16,7 @@ Ints = NDArray[np.int64]
 _SAME_PLACE_PX = 1.5
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, nogil=True, fastmath=True)
 def _distance2(a: Floats, b: Floats) -> float:
     total = np.float32(0.0)
     for k in range(a.size):
@@ -25,7 +25,7 @@ def _distance2(a: Floats, b: Floats) -> float:
     return float(total)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def mutual_matches(
     uv_a: Floats,
     size_a: Floats,
@@ -81,7 +81,7 @@ def mutual_matches(
     return _accept(best_a, row_a, second_a, row_b, second_b, limits)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _accept(
     best_a: NDArray[np.float64],
     row_a: Ints,
@@ -101,7 +101,7 @@ def _accept(
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _offer(
     best: NDArray[np.float64],
     row: Ints,

@@ -100,7 +100,7 @@ def refine_disparity(
     return _refine_disparity(left, right, stereo_px, *settings)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _refine_disparity(
     left: Floats,
     right: Floats,

@@ -121,7 +121,7 @@ def align_with_templates(
     return uv, sigma, fresh & aligned
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _align_all(
     templates: Floats,
     scale: Array,
@@ -143,7 +143,7 @@ def _align_all(
     return uv, sigma
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def cut_templates(left: Floats, uv: Array, half: int) -> Floats:
     """Cut patches of ``2 half + 1`` squared around points; flat ones where they leave the image."""
     out = np.zeros((len(uv), 2 * half + 1, 2 * half + 1), np.float32)
