@@ -91,6 +91,10 @@ BAD_SPECS = {
         TINY.replace("images: null", "images: {period_s: 0.123456}").replace("stereo: null", ""),
         ("images.period_s", "multiple", "0.12"),
     ),
+    "a goal that is too far": (
+        TINY.replace("route: null", "").replace("[0.3, 0]", "[1.0e+7, 0]"),
+        ("too far to plan", "route.cell_m", "waypoints between"),
+    ),
     "a model that is not there": (
         TINY + "rover: {model: sojourner}\n",
         ("sojourner", "exomars"),
