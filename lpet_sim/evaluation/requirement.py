@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from lpet_sim.evaluation.errors import worst_position_ratio
-from lpet_sim.evaluation.result import RunResult
+from lpet_sim.evaluation.result import BROKEN, RunResult
 from lpet_sim.spec import Spec
 
 AXES = ("roll", "pitch", "yaw")
@@ -51,15 +51,17 @@ class Verdict:
     Attributes:
         name: The estimator's name.
         lines: The lines.
+        broken: The run's failure where no line can make up for it (`BROKEN`), else None.
     """
 
     name: str
     lines: tuple[VerdictLine, ...]
+    broken: str | None = None
 
     @property
     def passed(self) -> bool:
-        """Whether every line is met."""
-        return all(line.passed for line in self.lines)
+        """Whether every line is met by a run that is not broken."""
+        return self.broken is None and all(line.passed for line in self.lines)
 
     @property
     def word(self) -> str:
@@ -103,14 +105,16 @@ class Requirement(Spec):
             result: The run's score.
 
         Returns:
-            One line for each limit; a run without a result fails them all.
+            One line for each limit; a run without a result fails them all, and a broken run fails
+            whatever its lines say.
         """
+        broken = result.failure in BROKEN
         lines = [VerdictLine("completion", "ratio", result.completion, self.completion, True)]
         if self.throughout:
             lines += self._lines("throughout", self._worst(result), result.worst_attitude_rad)
         if self.at_end:
             lines += self._lines("at the end", result.endpoint_ratio, result.endpoint_attitude_rad)
-        return Verdict(result.name, tuple(lines))
+        return Verdict(result.name, tuple(lines), result.failure if broken else None)
 
     def _worst(self, result: RunResult) -> float:
         if result.series is None:

@@ -26,6 +26,8 @@ from lpet_sim.spec import Spec
 Triple = tuple[float, float, float]
 INCOMPLETE, DIVERGED, NOT_FINITE = "incomplete", "diverged", "not_finite"
 BAD_COVARIANCE, LOST, EXCEPTION = "bad_covariance", "lost", "exception"
+BROKEN = frozenset({NOT_FINITE, BAD_COVARIANCE, LOST, EXCEPTION})
+"""Failures that no small error makes up for."""
 
 
 class EvaluationSpec(Spec):

@@ -36,17 +36,25 @@ def result_table(
     return table
 
 
-def verdict_table(verdict: Verdict) -> Table:
-    """Make a table with one row for each line of a requirement."""
-    table = Table(title=Text(f"{verdict.name}: {verdict.word}"))
+def verdict_table(verdicts: Sequence[Verdict]) -> Table:
+    """Make a table with one row for each line of a requirement and one column for each run.
+
+    Args:
+        verdicts: At least one, all of the same requirement.
+    """
+    table = Table(title=Text("Requirement, line by line"))
     table.add_column("line")
-    for heading in ("value", "limit", "margin"):
-        table.add_column(Text(heading), justify="right")
-    table.add_column("verdict", justify="center")
-    for line in verdict.lines:
-        numbers = (_quantity(line, x) for x in (line.value, line.limit, line.margin))
-        table.add_row(line.quantity, *numbers, pass_or_fail(line.passed))
+    table.add_column("limit", justify="right")
+    for verdict in verdicts:
+        table.add_column(Text(verdict.name), justify="right")
+    for lines in zip(*(verdict.lines for verdict in verdicts), strict=True):
+        limit = _quantity(lines[0], lines[0].limit)
+        table.add_row(lines[0].quantity, limit, *(_line_text(line) for line in lines))
     return table
+
+
+def _line_text(line: VerdictLine) -> Text:
+    return Text(_quantity(line, line.value) + " ").append_text(pass_or_fail(line.passed))
 
 
 def segment_table(results: Sequence[RunResult]) -> Table:

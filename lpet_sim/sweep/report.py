@@ -9,13 +9,13 @@ from rich.table import Table
 from rich.text import Text
 
 from lpet_sim.evaluation import Requirement
-from lpet_sim.evaluation.tables import attribution_table, result_table, segment_table
+from lpet_sim.evaluation.tables import attribution_table, result_table, segment_table, verdict_table
 from lpet_sim.sweep.score import Score
 from lpet_sim.terrain.summary import TerrainSummary
 
 
 def score_tables(score: Score, requirement: Requirement) -> Iterator[Table]:
-    """Make the tables of a score: results with verdicts, segment drift, error by cause.
+    """Make the tables of a score: errors, verdict by line, segment drift, error by cause.
 
     Args:
         score: The score.
@@ -24,6 +24,7 @@ def score_tables(score: Score, requirement: Requirement) -> Iterator[Table]:
     source = score.recording.manifest
     seed = "" if source.seed is None else f", seed {source.seed}"
     yield result_table(score.results, requirement, f"{source.source}{seed}")
+    yield verdict_table([requirement.check(result) for result in score.results])
     yield segment_table(score.results)
     if score.attribution is not None:
         yield attribution_table(score.attribution)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field
 
@@ -13,7 +14,7 @@ from lpet_sim.planning.route import nearest_clear, plan_route_over
 from lpet_sim.recording.recording import Manifest
 from lpet_sim.rover.spec import DriveSpec, RoverSpec
 from lpet_sim.sensors.suite import SensorSuiteSpec
-from lpet_sim.spec import Spec
+from lpet_sim.spec import Spec, read_yaml
 from lpet_sim.terrain.load import load_terrain_spec
 from lpet_sim.terrain.spec import TerrainSpec
 from lpet_sim.terrain.terrain import Terrain
@@ -68,6 +69,19 @@ class TraverseSpec(Spec):
     move_within_m: Annotated[float, Field(ge=0)] = 0.0
     sensors: SensorSuiteSpec = SensorSuiteSpec()
     images: ImagesSpec | None = ImagesSpec()
+
+    @classmethod
+    def from_yaml(cls, path: Path | str) -> Self:
+        """Read the traverse from a YAML file; a terrain's file is looked for beside it first.
+
+        Raises:
+            SpecError: The file is missing, is not YAML, or holds an unknown key or a bad value.
+        """
+        mapping = read_yaml(Path(path))
+        if isinstance(mapping, dict) and isinstance(mapping.get("terrain"), str):
+            beside = Path(path).parent / mapping["terrain"]
+            mapping |= {"terrain": str(beside)} if beside.is_file() else {}
+        return cls.from_mapping(mapping, source=str(path))
 
 
 def planned_drive(spec: TraverseSpec, terrain: Terrain, seed: int) -> DriveSpec:

@@ -165,6 +165,16 @@ def test_a_run_that_ended_in_an_exception_fails_every_line() -> None:
     assert not any(line.passed for line in verdict.lines)
 
 
+def test_a_broken_run_fails_however_small_its_errors() -> None:
+    """No error makes up for a covariance that is none."""
+    truth = straight(20.0, 201)
+    result = evaluate(as_estimate(truth, covariance=-_covariances(201)), as_truth(truth))
+    verdict = Requirement().check(result)
+    assert all(line.passed for line in verdict.lines)
+    assert not verdict.passed
+    assert verdict.broken == "bad_covariance"
+
+
 def test_the_score_goes_to_json() -> None:
     """Everything but the series, as plain values."""
     truth = straight(20.0, 201)

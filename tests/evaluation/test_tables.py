@@ -42,12 +42,12 @@ def test_the_numbers_are_in_the_units_of_the_headings() -> None:
         assert part in text
 
 
-def test_the_verdict_names_every_line_with_limit_and_margin() -> None:
-    """2 % against 1 % has a margin of -1 %."""
+def test_the_verdict_names_every_line_with_its_limit_and_each_run_beside_it() -> None:
+    """2 % against 1 % fails, 0.5 % passes."""
     truth = straight(20.0, 201)
-    result = evaluate(as_estimate(scaled(truth, 1.02)), as_truth(truth))
-    text = _text(verdict_table(Requirement().check(result)))
-    for part in ("position, throughout", "2.000 %", "1.000 %", "-1.000 %", "1.000 deg"):
+    results = [evaluate(as_estimate(scaled(truth, s)), as_truth(truth)) for s in (1.02, 1.005)]
+    text = _text(verdict_table([Requirement().check(result) for result in results]))
+    for part in ("position, throughout", "1.000 %", "2.000 % FAIL", "0.500 % PASS", "1.000 deg"):
         assert part in text
 
 

@@ -1,0 +1,41 @@
+"""A traverse's YAML finds its terrain by preset, beside itself, or inline."""
+
+from pathlib import Path
+
+import pytest
+
+from lpet_sim.errors import UnknownNameError
+from lpet_sim.sweep.traverse import TraverseSpec
+
+DRIVE = "drive: {waypoints_m: [[0, 0], [2, 0]]}\n"
+
+
+def _traverse(folder: Path, terrain: str) -> TraverseSpec:
+    path = folder / "traverse.yaml"
+    path.write_text(f"terrain: {terrain}\n{DRIVE}")
+    return TraverseSpec.from_yaml(path)
+
+
+def test_a_terrain_file_is_found_beside_the_traverse(tmp_path: Path) -> None:
+    """Wherever the command is run from."""
+    (tmp_path / "plain.yaml").write_text("name: plain\nfar: null\n")
+    assert _traverse(tmp_path, "plain.yaml").terrain.name == "plain"
+
+
+def test_a_preset_and_an_inline_terrain_need_no_file(tmp_path: Path) -> None:
+    """Both give a whole terrain."""
+    assert _traverse(tmp_path, "pathfinder").terrain.name == "pathfinder"
+    assert _traverse(tmp_path, "{name: inline}").terrain.name == "inline"
+
+
+def test_a_traverse_goes_to_yaml_and_back(tmp_path: Path) -> None:
+    """Every field, defaults and all."""
+    spec = _traverse(tmp_path, "exomars")
+    spec.to_yaml(tmp_path / "again.yaml")
+    assert TraverseSpec.from_yaml(tmp_path / "again.yaml") == spec
+
+
+def test_an_unknown_preset_is_answered_with_the_known_ones(tmp_path: Path) -> None:
+    """It names them all."""
+    with pytest.raises(UnknownNameError, match="exomars, gale, mer_spirit, pathfinder"):
+        _traverse(tmp_path, "venus")
