@@ -183,7 +183,7 @@ def demo(
     from lpet_sim.study import run_demo
     from lpet_sim.sweep.report import score_tables
 
-    with _bar("starting") as progress:
+    with _bar("drive, localize, score") as progress:
         study = run_demo(out, seed, progress)
     _print_tables(score_tables(study.score, study.requirement))
     _wrote(*study.written)

@@ -23,7 +23,7 @@ class RoverSpec(Spec):
 
     Attributes:
         model: Name of a file in ``models/``, without its ending.
-        physics_dt_s: Physics step; 5 ms holds the slip law to 0.3 points (REFERENCE 4).
+        physics_dt_s: Physics step; 5 ms holds the slip law to 0.3 points (measured).
         patch_m: Side of the square of ground that is loaded around the rover.
         rock_min_diameter_m: Smaller rocks are pressed into the soil and not collided with
             (assumption: half the wheel's width).

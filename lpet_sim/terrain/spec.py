@@ -92,14 +92,12 @@ class SoilClass(Spec):
     Attributes:
         name: What it is called.
         area_fraction: Share of the ground; the shares of a terrain sum to 1.
-        friction: Coulomb coefficient against a wheel; 0.9 is the stiff contact of REFERENCE 4.
         firm: True for bedrock and hard crust, False for loose soil in which wheels slip.
         tone: Albedo relative to the terrain's mean.
     """
 
     name: Annotated[str, Field(min_length=1)]
     area_fraction: Fraction = 1.0
-    friction: Annotated[float, Field(gt=0.0, le=2.0)] = 0.9
     firm: bool = False
     tone: Annotated[float, Field(gt=0.0, le=3.0)] = 1.0
 

@@ -12,7 +12,7 @@ def _covariance(rng: np.random.Generator, d: int = 6) -> np.ndarray:
 
 
 def test_bands_are_those_published() -> None:
-    """Two-sided 95 % bands of REFERENCE: N = 50 and 100 with 3 and 6 degrees of freedom."""
+    """Two-sided 95 % bands, chi2(N n)/N: N = 50 and 100 with 3 and 6 degrees of freedom."""
     published = {(50, 3): (2.36, 3.72), (50, 6): (5.08, 7.00)}
     published |= {(100, 3): (2.54, 3.50), (100, 6): (5.34, 6.70)}
     for (runs, dof), band in published.items():
