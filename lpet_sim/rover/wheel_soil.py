@@ -63,8 +63,8 @@ class TabulatedSlipSpec(Spec):
     """Slip as a table over the traction ratio T/N: a placeholder until a soil-mechanics law.
 
     The default table is NASA's MGRU3 rover on a tilt bed of loose GRC-1, as digitised from its
-    published curve, read at ``T/N = tan(slope)``. It holds for driving and, mirrored about its value at zero, for braking; the
-    mirror and all factors are assumptions.
+    published curve, read at ``T/N = tan(slope)``. It holds for driving and, mirrored about its
+    value at zero, for braking; the mirror and all factors are assumptions.
 
     Attributes:
         traction_ratio: T/N of the nodes, increasing from 0.
