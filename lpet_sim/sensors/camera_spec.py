@@ -17,6 +17,8 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 #: Focal length of a 1024 px wide camera with 65 deg field of view, the ExoMars LocCam's [recalled].
 LOCCAM_FOCAL_PX = 804.0
 
+_COARSE_CELL_M = 1.6 / 24  # a whole, even number of cells to the default's tile
+
 
 class ImageChainSpec(Spec):
     """From radiance to numbers: optics, photons, electronics.
@@ -151,8 +153,14 @@ class StereoCameraSpec(Spec):
 
     @classmethod
     def small(cls) -> StereoCameraSpec:
-        """Make the 640 x 480 px camera with the default's horizontal field of view."""
-        return cls(width_px=640, height_px=480, focal_px=LOCCAM_FOCAL_PX * 640 / 1024)
+        """Make the 640 x 480 px camera with the default's horizontal field of view.
+
+        Its pixels are 1.6 times as coarse as the default's, and so are the cells of its ground.
+        """
+        ground = GroundDetailSpec(cell_m=_COARSE_CELL_M)
+        return cls(
+            width_px=640, height_px=480, focal_px=LOCCAM_FOCAL_PX * 640 / 1024, ground=ground
+        )
 
     @property
     def field_of_view_rad(self) -> float:
