@@ -25,7 +25,8 @@ def score_tables(score: Score, requirement: Requirement) -> Iterator[Table]:
     seed = "" if source.seed is None else f", seed {source.seed}"
     yield result_table(score.results, requirement, f"{source.source}{seed}")
     yield verdict_table([requirement.check(result) for result in score.results])
-    yield segment_table(score.results)
+    if any(result.segments for result in score.results):
+        yield segment_table(score.results)
     if score.attribution is not None:
         yield attribution_table(score.attribution)
 
