@@ -28,6 +28,7 @@ app = typer.Typer(
 import_app = typer.Typer(help="Make a recording of a real data set.", no_args_is_help=True)
 app.add_typer(import_app, name="import")
 
+_FILE_WIDTH = 140
 RecordingArgument = Annotated[Path, typer.Argument(metavar="RUN.rrd", help="A recording.")]
 SeedOption = Annotated[int, typer.Option(help="Seed of everything random.")]
 RequirementOption = Annotated[
@@ -59,7 +60,10 @@ def _bar(title: str) -> Iterator[Progress]:
 
 
 def _print_tables(tables: Iterable[Table]) -> None:
+    """Print tables, wide enough to be whole where no terminal sets the width."""
     console = Console()
+    if not console.is_terminal:
+        console.width = _FILE_WIDTH
     for table in tables:
         console.print(table)
 

@@ -13,6 +13,11 @@ from lpet_sim.evaluation.errors import SegmentDrift
 from lpet_sim.evaluation.requirement import Requirement, Verdict, VerdictLine
 from lpet_sim.evaluation.result import RunResult
 
+_CAUSES = (
+    "scale: encoders' scale and noise, track width; slip: along the wheels; model: sideways slip, "
+    "and the tilt of the ground, which wheels cannot see. Vectors add up, lengths do not."
+)
+
 
 def result_table(
     results: Sequence[RunResult], requirement: Requirement | None = None, title: str | None = None
@@ -73,6 +78,7 @@ def segment_table(results: Sequence[RunResult]) -> Table:
 def attribution_table(attribution: ErrorAttribution) -> Table:
     """Make a table of the causes of dead reckoning's endpoint error."""
     table = Table(title=f"Dead reckoning's error after {attribution.distance_m:.1f} m, by cause")
+    table.caption = Text(_CAUSES, justify="left")
     table.add_column("cause")
     for heading in ("x [m]", "y [m]", "z [m]", "length [m]", "length [% of dist.]"):
         table.add_column(Text(heading), justify="right")
