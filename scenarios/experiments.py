@@ -3,7 +3,8 @@
     python -m scenarios.experiments [--quick] [--out docs/results] [--workers 2]
 
 Writes ``demo_seeds.csv`` (a row for each seed, arm and estimator) and ``demo_seeds.md`` (medians).
-Each seed is kept in ``out/experiments`` as it ends, so a killed run goes on where it was.
+Each seed is kept in ``out/experiments`` as it ends, so a killed run goes on where it was; a change
+of spec or code begins anew.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def demo_spec(quick: bool) -> TraverseSpec:
 
 def run_seed(spec: TraverseSpec, seed: int) -> list[Row]:
     """Drive one seed and give its rows; the result is kept, and read back the next time."""
-    key = hashlib.sha256(json.dumps(spec.to_mapping()).encode()).hexdigest()[:12]
+    key = _key(spec)
     kept = CACHE / f"{spec.name}_{key}_seed{seed}.json"
     if kept.exists():
         return list(json.loads(kept.read_text()))
@@ -64,6 +65,15 @@ def run_seed(spec: TraverseSpec, seed: int) -> list[Row]:
         temporary.write_text(json.dumps(rows))
     run.unlink()
     return rows
+
+
+def _key(spec: TraverseSpec) -> str:
+    """Give what a kept result hangs on: the spec, and every line of the product's code."""
+    digest = hashlib.sha256(json.dumps(spec.to_mapping()).encode())
+    for package in ("lpet_sim", "estimators"):
+        for path in sorted((SCENARIOS.parent / package).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
 
 
 def _score(run: Path, seed: int) -> list[Row]:
