@@ -128,6 +128,10 @@ def evaluate(
     run: RecordingArgument,
     requirement: RequirementOption = None,
     check: Annotated[bool, typer.Option(help="Exit with 1 if any verdict is FAIL.")] = False,
+    from_s: Annotated[
+        float | None,
+        typer.Option(min=0, help="Score from this time on, moved onto the truth there [s]."),
+    ] = None,
 ) -> None:
     """Score a recording's estimates against its truth, and hold them to a requirement."""
     from lpet_sim.evaluation import Requirement
@@ -135,7 +139,7 @@ def evaluate(
     from lpet_sim.sweep.score import score_recording
 
     held_to = Requirement() if requirement is None else Requirement.from_yaml(requirement)
-    score = score_recording(run)
+    score = score_recording(run, from_s)
     _print_tables(score_tables(score, held_to))
     if check and not all(held_to.check(result).passed for result in score.results):
         raise typer.Exit(1)

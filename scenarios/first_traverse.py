@@ -1,6 +1,6 @@
 """Drive a rover among rocks, localize it by every estimator, and score it: the demo as a script.
 
-python scenarios/first_traverse.py --out out/first --seed 1 [--quick]
+python -m scenarios.first_traverse --out out/first --seed 1 [--quick]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Drive a kilometre without images and watch the memory: what it takes must not grow.
 
-    python scenarios/kilometre.py --out out/km [--length 1000] [--seed 1] [--quick]
+    python -m scenarios.kilometre --out out/km [--length 1000] [--seed 1] [--quick]
 
 Prints the resident memory each 100 m, and the real-time factor of the whole drive.
 """

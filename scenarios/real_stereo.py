@@ -1,6 +1,6 @@
 """Run the front end and frame-to-frame motion estimation on real stereo images of a car.
 
-    python scenarios/real_stereo.py [--quick] [--data DIR] [--out DIR]
+    python -m scenarios.real_stereo [--quick] [--data DIR] [--out DIR]
 
 Scored from images 20, 30 and 40 to the end, for five seeds of the RANSAC; the sequence's truth is
 off by over a metre before image 20. libviso2's poses, where they lie beside the images, are scored

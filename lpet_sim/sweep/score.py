@@ -13,6 +13,7 @@ from lpet_sim.evaluation import RunResult, evaluate
 from lpet_sim.evaluation.attribution import ErrorAttribution, attribute_error
 from lpet_sim.evaluation.errors import ErrorSeries, error_series
 from lpet_sim.progress import Progress, silent, track
+from lpet_sim.recording.arrays import NS_PER_S
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.overlay import add_estimates
 from lpet_sim.recording.reader import read_estimates, read_recording
@@ -92,8 +93,13 @@ def _errors(estimate: Estimate, recording: Recording) -> ErrorSeries | None:
     return error_series(estimate.trajectory, recording.truth.trajectory)
 
 
-def score_recording(path: Path) -> Score:
+def score_recording(path: Path, from_s: float | None = None) -> Score:
     """Score every estimate in a recording against its truth.
+
+    Args:
+        path: The recording.
+        from_s: Score from this time on only, each estimate moved as a whole onto the truth there;
+            None scores all of it as it stands.
 
     Raises:
         RecordingError: The recording cannot be read, holds no truth, or no estimates.
@@ -104,7 +110,8 @@ def score_recording(path: Path) -> Score:
         raise RecordingError(f"{path} holds no truth to score against; give one that does")
     if not estimates:
         raise RecordingError(f"{path} holds no estimates; run 'lpet estimate {path}' first")
-    results = tuple(evaluate(estimate, recording.truth) for estimate in estimates)
+    anchor_t_ns = None if from_s is None else round(from_s * NS_PER_S)
+    results = tuple(evaluate(e, recording.truth, anchor_t_ns=anchor_t_ns) for e in estimates)
     return Score(recording, estimates, results, attribute_dead_reckoning(recording))
 
 

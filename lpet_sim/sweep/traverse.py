@@ -9,6 +9,7 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator, Field
 
 import lpet_sim
+from lpet_sim.errors import PlanningError
 from lpet_sim.planning.clearance import RouteSpec
 from lpet_sim.planning.route import nearest_clear, plan_route_over
 from lpet_sim.recording.recording import Manifest
@@ -21,6 +22,12 @@ from lpet_sim.terrain.terrain import Terrain
 from lpet_sim.vision.spec import FrontEndSpec
 
 _PACKAGES = ("numpy", "scipy", "mujoco", "opencv-python-headless", "rerun-sdk", "ompl", "numba")
+
+
+_WAYS_OUT = (
+    "move the waypoint, let it be moved (move_within_m), raise route.obstacle_height_m, or drive "
+    "straight on (route: null)"
+)
 
 
 def _named_terrain(value: object) -> object:
@@ -95,7 +102,10 @@ def planned_drive(spec: TraverseSpec, terrain: Terrain, seed: int) -> DriveSpec:
     route, corners = spec.route, spec.drive.waypoints_m
     if spec.move_within_m > 0:
         corners = tuple(nearest_clear(terrain, c, spec.move_within_m, route) for c in corners)
-    path = plan_route_over(terrain, corners, route, seed)
+    try:
+        path = plan_route_over(terrain, corners, route, seed)
+    except PlanningError as error:
+        raise PlanningError(f"{error}; {_WAYS_OUT}") from None
     # The route is clear of rocks only if it is driven with the rounding it was planned for.
     rounding = {name: getattr(route, name) for name in ("corner_cut_m", "min_turn_radius_m")}
     return spec.drive.model_copy(update={"waypoints_m": path, **rounding})
