@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from estimators import gaussian
-from estimators.motion import OdometryTrack, wheel_odometry
+from estimators.fused_odometry import odometry_track
+from estimators.motion import OdometryTrack
 from estimators.view_pair import CameraStep, TwoViewSpec, ViewPair, estimate_step
 from lpet_sim.errors import RecordingError
 from lpet_sim.geometry import SE3
@@ -79,7 +80,7 @@ class FrameToFrame:
         last motion is held where there are no wheels; ``bridged`` among the diagnostics says so.
         """
         sightings, calibration = declared_sightings(measurements)
-        odometry = None if measurements.wheels is None else wheel_odometry(measurements)
+        odometry = None if measurements.wheels is None else odometry_track(measurements)
         steps = self._steps(sightings, calibration, odometry)
         start = _start_pose(measurements, odometry, int(sightings.t_ns[0]))
         poses, covariance = chain(start, steps)
@@ -113,7 +114,7 @@ class FrameToFrame:
         return steps
 
     def _bridge(self, odometry: OdometryTrack | None, t_ns: tuple[int, int], last: SE3) -> BodyStep:
-        """Step by the wheels, or hold the last motion."""
+        """Step by the best odometry there is, or hold the last motion."""
         if odometry is not None:
             known = odometry.trajectory.t_ns
             within = np.clip(t_ns, known[0], known[-1])
@@ -194,7 +195,7 @@ def _in_body(seen: CameraStep, T_body_camera: SE3) -> BodyStep:
 
 
 def _start_pose(measurements: Measurements, odometry: OdometryTrack | None, t_ns: int) -> SE3:
-    """Give the pose at the first image: the known start, moved on by the wheels until then."""
+    """Give the pose at the first image: the known start, moved on by odometry until then."""
     start = measurements.calibration.T_world_body_start.se3()
     if odometry is None:
         return start

@@ -63,11 +63,6 @@ class Verdict:
         """Whether every line is met by a run that is not broken."""
         return self.broken is None and all(line.passed for line in self.lines)
 
-    @property
-    def word(self) -> str:
-        """``PASS`` or ``FAIL``."""
-        return "PASS" if self.passed else "FAIL"
-
 
 class Requirement(Spec):
     """Limits on a run; the paper's by default: 1 % of the distance and 1 deg per axis, throughout.

@@ -46,12 +46,6 @@ class RoverFrames:
         return self.wheel_position_body_m - [0.0, 0.0, self.wheel_radius_m]
 
     @property
-    def stereo_baseline_m(self) -> float:
-        """Distance between the eyes [m]."""
-        step = self.T_body_camera.translation - self.T_body_camera_right.translation
-        return float(np.linalg.norm(step))
-
-    @property
     def ride_height_m(self) -> float:
         """Height of the body's origin above flat ground at rest [m]."""
         return float(-self.contact_body_m[:, 2].mean())

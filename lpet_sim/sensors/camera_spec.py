@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -161,11 +160,6 @@ class StereoCameraSpec(Spec):
         return cls(
             width_px=640, height_px=480, focal_px=LOCCAM_FOCAL_PX * 640 / 1024, ground=ground
         )
-
-    @property
-    def field_of_view_rad(self) -> float:
-        """Horizontal field of view [rad]."""
-        return 2 * math.atan(self.width_px / (2 * self.focal_px))
 
     @property
     def principal_px(self) -> tuple[float, float]:

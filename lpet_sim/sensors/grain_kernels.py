@@ -45,16 +45,6 @@ def stoniness(key, x, y):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def stoniness_at(key, x0, y0, cell, rows, columns):  # type: ignore[no-untyped-def]
-    """Give `stoniness` at the nodes ``((x0 + j), (y0 + i)) * cell``, Shape (rows, columns)."""
-    out = np.empty((rows, columns))
-    for i in range(rows):
-        for j in range(columns):
-            out[i, j] = stoniness(key, (x0 + j) * cell, (y0 + i) * cell)
-    return out
-
-
-@njit(cache=True, nogil=True)
 def add_grain(height, x0, y0, texel, wavelength, amplitude, key):  # type: ignore[no-untyped-def]
     """Add one octave of smooth noise; texel (i, j) is at ``(x0 + j + 0.5, y0 + i + 0.5) texel``."""
     rows, columns = height.shape
