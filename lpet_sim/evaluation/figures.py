@@ -76,6 +76,7 @@ def plot_errors(results: Sequence[RunResult], requirement: Requirement | None = 
     rows[0].set_ylabel("position error\n[% of distance so far]")
     # Estimators differ by orders of magnitude; below 0.01 % the axis is linear down to zero.
     rows[0].set_yscale("symlog", linthresh=0.01)
+    rows[0].yaxis.set_major_formatter("{x:g}")
     rows[0].set_ylim(bottom=0)
     for row, axis, limit in zip(rows[1:], AXES, requirement.attitude_rad, strict=True):
         _limit(row, math.degrees(limit))
