@@ -31,3 +31,7 @@ class UnknownNameError(LpetError):
 
 class PlanningError(LpetError):
     """A start, goal or path that cannot be driven."""
+
+
+class BlockedPlaceError(PlanningError):
+    """A place at which the rover is to stand, but that is not clear."""

@@ -16,7 +16,7 @@ import ompl.base as ob
 import ompl.geometric as og
 import ompl.util as ou
 
-from lpet_sim.errors import PlanningError
+from lpet_sim.errors import BlockedPlaceError, PlanningError
 from lpet_sim.planning.clearance import ClearanceMap, Ground, Point, RouteSpec, map_clearance
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rng import stream
@@ -127,7 +127,7 @@ def _check_reachable(clearance: ClearanceMap, start: Point, goal: Point, spec: R
     for what, xy in (("start", start), ("goal", goal)):
         if not clearance.is_clear(xy, xy):
             row, column = clearance.node(xy)
-            raise PlanningError(
+            raise BlockedPlaceError(
                 f"the {what} {_name(xy)} is {clearance.distance_m[row, column]:.2f} m from an "
                 f"obstacle or the edge; {spec.needed_m:.2f} m are needed"
             )

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator, Field
 
 import lpet_sim
-from lpet_sim.errors import PlanningError
+from lpet_sim.errors import BlockedPlaceError
 from lpet_sim.planning.clearance import RouteSpec
 from lpet_sim.planning.route import nearest_clear, plan_route_over
 from lpet_sim.recording.recording import Manifest
@@ -104,8 +104,8 @@ def planned_drive(spec: TraverseSpec, terrain: Terrain, seed: int) -> DriveSpec:
         corners = tuple(nearest_clear(terrain, c, spec.move_within_m, route) for c in corners)
     try:
         path = plan_route_over(terrain, corners, route, seed)
-    except PlanningError as error:
-        raise PlanningError(f"{error}; {_WAYS_OUT}") from None
+    except BlockedPlaceError as error:
+        raise BlockedPlaceError(f"{error}; {_WAYS_OUT}") from None
     # The route is clear of rocks only if it is driven with the rounding it was planned for.
     rounding = {name: getattr(route, name) for name in ("corner_cut_m", "min_turn_radius_m")}
     return spec.drive.model_copy(update={"waypoints_m": path, **rounding})

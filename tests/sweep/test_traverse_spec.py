@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from lpet_sim.errors import UnknownNameError
-from lpet_sim.sweep.traverse import TraverseSpec
+from lpet_sim.errors import BlockedPlaceError, PlanningError, UnknownNameError
+from lpet_sim.sweep.traverse import TraverseSpec, planned_drive
+from lpet_sim.terrain.terrain import build_terrain
 
 DRIVE = "drive: {waypoints_m: [[0, 0], [2, 0]]}\n"
 
@@ -39,3 +40,22 @@ def test_an_unknown_preset_is_answered_with_the_known_ones(tmp_path: Path) -> No
     """It names them all."""
     with pytest.raises(UnknownNameError, match="exomars, gale, mer_spirit, pathfinder"):
         _traverse(tmp_path, "venus")
+
+
+def test_a_blocked_waypoint_is_answered_with_the_ways_out_and_an_unreachable_one_is_not() -> None:
+    """Moving a waypoint helps where it stands too close to a rock, not where there is no way."""
+    rocky = {"name": "rocky", "far": None, "rocks": {"kind": "abundance", "k": 0.19}}
+    refused: dict[type[Exception], str] = {}
+    for moved in (0.0, 5.0):
+        spec = TraverseSpec.from_mapping(
+            {
+                "terrain": rocky,
+                "drive": {"waypoints_m": [[0, 0], [15, 0]]},
+                "move_within_m": moved,
+            }
+        )
+        with pytest.raises(PlanningError) as error:
+            planned_drive(spec, build_terrain(spec.terrain, 0), 0)
+        refused[error.type] = str(error.value)
+    assert "move_within_m" in refused[BlockedPlaceError]
+    assert "move_within_m" not in refused[PlanningError]
