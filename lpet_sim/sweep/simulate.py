@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -97,18 +98,13 @@ def simulate(spec: TraverseSpec, seed: int, path: Path, progress: Progress = sil
     with RecordingWriter(path, manifest, calibration, keep) as writer, ExitStack() as stack:
         sensing = _Sensing(world, calibration, writer, stack)
         driven_m, length_m = 0.0, _length_m(world.drive)
-        for piece in _and_then(first, pieces):
+        for piece in chain([first], pieces):
             sensing.sense(piece)
             driven_m += _moved_m(piece)
             progress(min(1.0, driven_m / length_m))
         sensing.finish()
         draw_ground(writer, world.terrain, np.asarray(world.drive.waypoints_m))
     return path
-
-
-def _and_then(first: Truth, rest: Iterable[Truth]) -> Iterable[Truth]:
-    yield first
-    yield from rest
 
 
 def _calibration(world: World, first: Truth) -> Calibration:
