@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("lpet_sim", "estimators")
 
 FOUNDATION = {"errors", "rng", "spec", "datasets", "outputs", "progress"}
-PHYSICAL = {"terrain", "rover", "sensors", "planning"}
+PHYSICAL = {"soil", "terrain", "rover", "sensors", "planning", "rig"}
 MAY_IMPORT: dict[str, set[str]] = {
     "foundation": set(),
     "geometry": set(),
@@ -19,10 +19,12 @@ MAY_IMPORT: dict[str, set[str]] = {
     "vision": {"foundation", "geometry", "recording"},
     "evaluation": {"foundation", "geometry", "recording"},
     "estimators": {"foundation", "geometry", "recording", "evaluation"},
-    "terrain": {"foundation", "geometry", "recording"},
-    "rover": {"foundation", "geometry", "recording", "terrain"},
-    "sensors": {"foundation", "geometry", "recording", "terrain", "rover"},
-    "planning": {"foundation", "geometry", "recording", "terrain", "rover"},
+    "soil": {"foundation", "geometry", "recording"},
+    "terrain": {"foundation", "geometry", "recording", "soil"},
+    "rover": {"foundation", "geometry", "recording", "soil", "terrain"},
+    "sensors": {"foundation", "geometry", "recording", "soil", "terrain", "rover"},
+    "planning": {"foundation", "geometry", "recording", "soil", "terrain", "rover"},
+    "rig": {"foundation", "geometry", "recording", "soil", "terrain", "rover"},
 }
 MAY_IMPORT["sweep"] = {*MAY_IMPORT} - {"sweep"}
 MAY_IMPORT["tradeoff"] = {*MAY_IMPORT}

@@ -1,0 +1,1 @@
+"""Soil mechanics of a wheel: what a slip gives in traction, side force, sinkage; and back."""
