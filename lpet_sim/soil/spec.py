@@ -15,7 +15,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 Evidence = Literal["measured", "published", "fitted", "assumed"]
-"""How well a soil is known: a measured curve, another's published parameters, our fit, our guess."""
+"""How well a soil is known: a measured curve, others' published parameters, our fit, a guess."""
 
 
 class WheelSpec(Spec):
