@@ -69,6 +69,22 @@ class Scene:
         _, x, y, _ = self._qpos[3:7]
         return float(1 - 2 * (x * x + y * y))
 
+    @property
+    def sinkage_m(self) -> Array:
+        """How deep each wheel stands in the soil [m], Shape (6,)."""
+        return np.zeros(6)
+
+    @property
+    def belly_load_n(self) -> float:
+        """Sum of the normal forces of ground and rocks on the belly in the last step [N].
+
+        Of each contact the first row of the constraint force is the normal one. Just after the
+        ground was cut anew there are no contacts yet: ask before `follow`.
+        """
+        contact = self.data.contact
+        rows = contact.efc_address[(contact.geom == self._belly_geom).any(axis=1)]
+        return float(self.data.efc_force[rows[rows >= 0]].sum())
+
     def place(self, xy: Array, yaw_rad: float) -> None:
         """Set the rover down at rest, upright on the plane through the ground under its wheels."""
         self._load_patch(np.asarray(xy, dtype=float), carry=False)
@@ -181,6 +197,7 @@ class Scene:
         self._geom_xmat, self._qfrc_constraint = data.geom_xmat, data.qfrc_constraint
         self._surfacevel = model.geom_surfacevel
         self._wheel_geom = self._ids("geom", "wheel_")
+        self._belly_geom = model.geom("belly").id
         self._wheel_body = self._ids("body", "wheel_")
         self._leg_body = self._ids("body", "leg_")
         self._drive_act = self._ids("actuator", "drive_")
