@@ -8,7 +8,7 @@ from typing import Any
 from lpet_sim.recording.streams import Measurements
 from lpet_sim.recording.truth import Truth
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,12 @@ class WheelTruth(ArrayStruct):
         slip: ``1 - v / (r omega)`` of each wheel, the mean since the sample before, 0 where it does
             not turn, Shape (n, w).
         load_n: Normal force on each wheel [N], Shape (n, w).
+        traction_n: Force of the ground on each wheel along its heading, positive where it pushes
+            the rover forward [N], Shape (n, w).
+        sinkage_m: How deep each wheel's lowest point lies below the ground's surface [m],
+            Shape (n, w).
+        slip_angle_rad: Direction of each wheel's motion against its plane, positive to the left,
+            the mean since the sample before, 0 where it does not move, Shape (n, w).
         contact: `CONTACT_NONE`, `CONTACT_SOIL` or `CONTACT_ROCK`, Shape (n, w), uint8.
         joint_angle_rad: Suspension joints, for drawing the rover [rad], Shape (n, j).
     """
@@ -51,6 +57,9 @@ class WheelTruth(ArrayStruct):
     steer_angle_rad: Array
     slip: Array
     load_n: Array
+    traction_n: Array
+    sinkage_m: Array
+    slip_angle_rad: Array
     contact: NDArray[np.uint8]
     joint_angle_rad: Array
 

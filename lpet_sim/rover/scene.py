@@ -222,7 +222,7 @@ class Scene:
         return np.concatenate([self._qpos[:7], self._qvel[:6]])
 
     def wheel_row(self) -> Array:
-        """Give the wheels' and joints' state as one row, for `truth_log`, Shape (72 + j,)."""
+        """Give the wheels' and joints' state as one row, for `truth_log`, Shape (78 + j,)."""
         load = self.wheel_state().load_n
         return np.concatenate(
             [
@@ -232,6 +232,8 @@ class Scene:
                 self._contact_kinds(),
                 self.data.xpos[self._wheel_body].ravel(),
                 self.data.xquat[self._leg_body].ravel(),
+                -self._qfrc_constraint[self._drive_dof] / self.frames.wheel_radius_m,
+                self.sinkage_m,
                 self._qpos[self._suspension_qpos],
             ]
         )

@@ -59,9 +59,9 @@ def rolling_wheels(t_ns: np.ndarray, speed: float, yaw_rate: float) -> WheelTrut
 
 def wheel_truth(t_ns: np.ndarray, drive: Array, steer: Array) -> WheelTruth:
     """Dress wheel angles as truth."""
-    zero = np.zeros(drive.shape)
+    none = [np.zeros(drive.shape) for _ in range(5)]  # slip, load, traction, sinkage, slip angle
     contact = np.ones(drive.shape, dtype=np.uint8)
-    return WheelTruth(t_ns, drive, steer, zero, zero.copy(), contact, np.zeros((len(t_ns), 0)))
+    return WheelTruth(t_ns, drive, steer, *none, contact, np.zeros((len(t_ns), 0)))
 
 
 def readings(truth: WheelTruth) -> WheelStream:

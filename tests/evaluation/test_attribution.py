@@ -38,7 +38,8 @@ def _drive(side_m: float = 0.0) -> tuple[WheelStream, Truth]:
     zero = np.zeros((2001, 3))
     body = BodyTruth(t_ns, SE3(SE3.identity(2001).rotation, position), zero, zero.copy())
     contact = np.ones((2001, 6), dtype=np.uint8)
-    wheels = WheelTruth(t_ns, angle, 0 * angle, slip, 0 * angle, contact, np.zeros((2001, 3)))
+    none = [0 * angle for _ in range(5)]  # steering, load, traction, sinkage, slip angle
+    wheels = WheelTruth(t_ns, angle, none[0], slip, *none[1:], contact, np.zeros((2001, 3)))
     measured = WheelStream(t_ns, SCALE * angle, 0 * angle)
     return measured, Truth(body, wheels, (FORCED,))
 

@@ -104,6 +104,9 @@ def truth(duration_s: float = 20.0, seed: int = 0) -> Truth:
         0.1 * rng.normal(size=(n, 6)),
         slip,
         100.0 + 20.0 * rng.normal(size=(n, 6)),
+        10.0 * rng.normal(size=(n, 6)),
+        0.01 * rng.random((n, 6)),
+        0.02 * rng.normal(size=(n, 6)),
         rng.integers(0, 3, (n, 6)).astype(np.uint8),
         0.1 * rng.normal(size=(n, 3)),
     )

@@ -77,7 +77,7 @@ def test_another_schema_is_refused(tmp_path: Path) -> None:
     recording = synthetic.recording(1.0)
     other = replace(recording, manifest=replace(recording.manifest, schema=99))
     write_recording(tmp_path / "new.rrd", other)
-    with pytest.raises(RecordingError, match="has schema 99: this version reads schema 1"):
+    with pytest.raises(RecordingError, match="has schema 99: this version reads schema 2"):
         read_recording(tmp_path / "new.rrd")
 
 

@@ -102,7 +102,7 @@ def test_the_suspension_climbs_a_rock_as_high_as_the_wheels_radius() -> None:
     for _ in range(45):
         _roll(scene, 0.6, rate_radps=4 * RATE_RADPS)
         row = scene.wheel_row()
-        joints.append(row[66:])
+        joints.append(row[78:])
         top.append(row[24:42].reshape(6, 3)[:, 2].max())
         tilt.append(math.degrees(math.acos(scene.up)))
     assert scene.xy[0] > 2.5
