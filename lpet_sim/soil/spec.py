@@ -123,6 +123,7 @@ class MechanicalSoilSpec(_NamedSoil):
         shear_modulus_x_m: K along the wheel.
         shear_modulus_x_per_rad_m: What each radian of slip angle adds to it (Ishigami's form).
         shear_modulus_y_m: K across the wheel.
+        shear_modulus_y_per_rad_m: What each radian of slip angle adds to it.
         density_kgpm3: Bulk density.
         peak_angle: a0 [-].
         peak_angle_slip: a1 [-].
@@ -144,6 +145,7 @@ class MechanicalSoilSpec(_NamedSoil):
     shear_modulus_x_m: Positive
     shear_modulus_x_per_rad_m: NotNegative = 0.0
     shear_modulus_y_m: Positive
+    shear_modulus_y_per_rad_m: NotNegative = 0.0
     density_kgpm3: Annotated[float, Field(ge=500.0, le=4000.0)]
     peak_angle: Annotated[float, Field(gt=0.0, lt=1.0)]
     peak_angle_slip: Annotated[float, Field(ge=0.0, lt=1.0)]
