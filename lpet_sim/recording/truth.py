@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,12 +74,14 @@ class Event:
         kind: Its kind, such as ``forced_slip``, ``stop`` or ``goal``.
         duration_s: How long it lasted [s].
         text: One sentence for the reader of the recording.
+        ends: Whether it ended the traverse; one event at most does.
     """
 
     t_ns: int
     kind: str
     duration_s: float = 0.0
     text: str = ""
+    ends: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,3 +102,13 @@ class Truth:
     def trajectory(self) -> Trajectory:
         """The body's poses over time."""
         return Trajectory(self.body.t_ns, self.body.T_world_body)
+
+    @property
+    def ending(self) -> Event | None:
+        """The event that ended the traverse, None where that is not known (imported data)."""
+        return next((event for event in self.events if event.ends), None)
+
+
+def in_order(events: Iterable[Event]) -> tuple[Event, ...]:
+    """Put events in order of time; of several at one time, the one that ends the drive is last."""
+    return tuple(sorted(events, key=lambda event: (event.t_ns, event.ends)))

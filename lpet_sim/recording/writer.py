@@ -25,7 +25,7 @@ from lpet_sim.recording.scene import DrawnLink, Mesh
 from lpet_sim.recording.sketch import Sketch
 from lpet_sim.recording.store import StoreWriter
 from lpet_sim.recording.streams import ImuStream, SightingStream, WheelStream
-from lpet_sim.recording.truth import Event, Truth
+from lpet_sim.recording.truth import Event, Truth, in_order
 from lpet_sim.recording.visuals import Pen
 
 
@@ -168,9 +168,10 @@ class RecordingWriter:
     def _complete(self) -> None:
         self._columns.flush()
         self._images.flush()
+        events = in_order(self._events)  # one that lasts is known when it is over
         if self._has_truth:
-            self._store.send_json(layout.EVENTS, [asdict(event) for event in self._events])
-        self._sketch.finish(self._events)
+            self._store.send_json(layout.EVENTS, [asdict(event) for event in events])
+        self._sketch.finish(events)
         publish(self._store, self._sketch.overview, self._manifest)
         self._store.commit()
 

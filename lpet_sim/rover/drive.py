@@ -11,18 +11,18 @@ import numpy as np
 
 from lpet_sim.errors import PlanningError, SpecError
 from lpet_sim.recording.arrays import NS_PER_S
-from lpet_sim.recording.truth import Event, Truth
-from lpet_sim.rover.follower import Command, Follower, PlanarPose
+from lpet_sim.recording.truth import Event, Truth, in_order
+from lpet_sim.rover.episodes import Watch
+from lpet_sim.rover.faults import Faults
+from lpet_sim.rover.follower import Follower
+from lpet_sim.rover.hazards import ends_drive, hazards_of
+from lpet_sim.rover.observer import Observer, Tick
 from lpet_sim.rover.scene import Scene, check_drivable
 from lpet_sim.rover.spec import DriveSpec
 from lpet_sim.rover.truth_log import TruthLog
 
 _log = logging.getLogger(__name__)
 
-_TIPPED_COSINE = math.cos(math.radians(45.0))
-_STUCK_WINDOW_S = 120.0
-_STUCK_SHARE = 0.1
-_TURN_LEVER_M = 0.8  # makes a distance of a turn on the spot: about a wheel's lever
 _START_TOLERANCE_M = 0.5
 
 
@@ -46,7 +46,10 @@ def drive(scene: Scene, spec: DriveSpec, chunk_s: float = 10.0) -> Iterator[Trut
     """Drive from the first waypoint to the last.
 
     The rover settles first; time 0 is after that. Every time is a whole number of physics steps.
-    A drive ends with an event: ``goal``, ``tipped``, ``stuck`` or ``time_limit``.
+    Exactly one event ends the drive (`Event.ends`): ``goal``, ``time_limit``, ``off_ground``, or
+    a failure of the kinds that ``spec.failures`` names; failures of other kinds are recorded and it
+    goes on. What lasts (faults and failures) is one event each time, in the chunk in which it is
+    over, with the time at which it began.
 
     Args:
         scene: A rover that stands at the first waypoint, from `build_scene`.
@@ -102,10 +105,13 @@ class _Drive:
         self._log = TruthLog(scene.frames.wheel_radius_m)
         self._dt_ns = round(scene.spec.physics_dt_s * NS_PER_S)
         self._step = 0
-        self._slips = list(spec.forced_slips)
-        self._slip_end_s = -1.0
+        self._ended = False
         self._limit_s = spec.time_limit_s or 3.0 * follower.nominal_s
-        self._window = _Progress()
+        self._faults = Faults(spec)
+        self._observer = Observer(ticks.control * scene.spec.physics_dt_s)
+        hazards = hazards_of(spec.failures, scene.frames, scene.ground.drivable)
+        self._watches = [Watch(fault) for fault in self._faults.all]
+        self._watches += [Watch(h, ends_drive(spec.failures, h.kind)) for h in hazards]
 
     @property
     def _t_s(self) -> float:
@@ -116,15 +122,15 @@ class _Drive:
         self._settle()
         self._note("start", 0.0, f"sets out on {self._follower.length_m:.1f} m")
         self._sample()
-        ended = False
-        while not ended:
+        while not self._ended:
             if self._step % self._ticks.control == 0:
-                ended = self._control()
-            if not ended:
+                self._control()
+            if not self._ended:
                 self._scene.step()
                 self._step += 1
                 self._sample()
-            if (ended or self._step % self._ticks.chunk == 0) and not self._log.empty:
+            if (self._ended or self._step % self._ticks.chunk == 0) and not self._log.empty:
+                self._log.events = list(in_order(self._log.events))
                 yield self._log.take()
 
     def _settle(self) -> None:
@@ -139,72 +145,53 @@ class _Drive:
         if self._step % self._ticks.wheels == 0:
             self._log.add_wheels(t_ns, self._scene.wheel_row())
 
-    def _control(self) -> bool:
-        """Give the next command; tell whether the drive has ended."""
-        scene = self._scene
-        scene.follow()
-        scene.refresh_soil()
-        pose = PlanarPose(float(scene.xy[0]), float(scene.xy[1]), scene.yaw_rad)
-        command = self._follower.command(pose)
-        scene.command(command.steer_rad, command.rate_radps)
+    def _control(self) -> None:
+        """Look what has happened, keep ground under the rover, command it, or end the drive."""
+        tick = self._observer.look(self._scene, self._t_s, self._place)
+        for watch in self._watches:
+            over = watch.look(tick)
+            if over is not None:
+                self._log.events.append(over)
+        try:
+            self._scene.follow()
+            self._scene.refresh_soil()
+        except PlanningError as error:  # it has slid to where no ground can be laid
+            self._end("off_ground", str(error))
+            return
+        self._command(tick)
+        self._end_if_due()
+
+    def _command(self, tick: Tick) -> None:
+        command = self._follower.command(tick.pose)
+        slipping = self._faults.slipping(tick.t_s)
+        self._scene.command(command.steer_rad, self._faults.lock(tick.t_s, command.rate_radps))
+        self._scene.hold(slipping)
+        self._observer.expect(None if slipping else command)
         for notice in self._follower.take_notices():
             self._note(notice.kind, notice.duration_s, notice.text)
-        self._force_slip()
-        return self._has_ended(pose, command)
 
-    def _force_slip(self) -> None:
-        if self._slips and self._t_s >= self._slips[0].start_s:
-            slip = self._slips.pop(0)
-            self._slip_end_s = slip.start_s + slip.duration_s
-            text = f"the wheels turn for {slip.duration_s:g} s and the rover does not move"
-            self._note("forced_slip", slip.duration_s, text)
-        self._scene.hold(self._t_s < self._slip_end_s)
-
-    def _has_ended(self, pose: PlanarPose, command: Command) -> bool:
-        reason = self._reason_to_end(pose, command)
-        if reason is not None:
-            kind, text = reason
-            self._note(kind, 0.0, text)
-            level = logging.INFO if kind == "goal" else logging.WARNING
-            _log.log(level, "%s after %.1f s: %s", kind, self._t_s, text)
-        return reason is not None
-
-    def _reason_to_end(self, pose: PlanarPose, command: Command) -> tuple[str, str] | None:
-        done, length = self._follower.progress_m, self._follower.length_m
+    def _end_if_due(self) -> None:
+        failed = next((w for w in self._watches if w.ends and w.episode is not None), None)
         if self._follower.finished:
-            return "goal", f"stands at the goal after {length:.1f} m"
-        if self._scene.up < _TIPPED_COSINE:
-            return "tipped", f"tipped over after {done:.1f} of {length:.1f} m"
-        if self._t_s >= self._limit_s:
-            return "time_limit", f"out of time after {done:.1f} of {length:.1f} m"
-        slipping = self._t_s < self._slip_end_s
-        dt_s = self._ticks.control * self._scene.spec.physics_dt_s
-        if self._window.is_stuck(pose, command, 0.0 if slipping else dt_s):
-            return "stuck", f"stuck after {done:.1f} of {length:.1f} m"
-        return None
+            self._end("goal", f"stands at the goal after {self._follower.length_m:.1f} m")
+        elif failed is not None and failed.episode is not None:
+            self._end(failed.kind, failed.episode.text, failed)
+        elif self._t_s >= self._limit_s:
+            self._end("time_limit", f"out of time {self._place}")
 
-    def _note(self, kind: str, duration_s: float, text: str) -> None:
-        self._log.events.append(Event(self._step * self._dt_ns, kind, duration_s, text))
+    def _end(self, kind: str, text: str, failed: Watch | None = None) -> None:
+        """End the drive, and with it every episode; a failure's own is the event of the end."""
+        self._ended = True
+        closed = [watch.close(self._t_s, watch is failed) for watch in self._watches]
+        self._log.events.extend(event for event in closed if event is not None)
+        if failed is None:
+            self._note(kind, 0.0, text, ends=True)
+        level = logging.INFO if kind == "goal" else logging.WARNING
+        _log.log(level, "%s after %.1f s: %s", kind, self._t_s, text)
 
+    @property
+    def _place(self) -> str:
+        return f"after {self._follower.progress_m:.1f} of {self._follower.length_m:.1f} m"
 
-class _Progress:
-    """Compares what was asked of the body with what it did, one window of time after another."""
-
-    def __init__(self) -> None:
-        self._from: PlanarPose | None = None
-        self._asked_m = 0.0
-        self._moving_s = 0.0
-
-    def is_stuck(self, pose: PlanarPose, command: Command, dt_s: float) -> bool:
-        """Count a tick; tell whether a window has passed with hardly any motion."""
-        start = self._from = self._from or pose
-        effort = abs(command.speed_mps) + _TURN_LEVER_M * abs(command.yaw_rate_radps)
-        self._asked_m += effort * dt_s
-        self._moving_s += dt_s if effort > 0 else 0.0
-        if self._moving_s < _STUCK_WINDOW_S:
-            return False
-        turned = abs(math.remainder(pose.yaw_rad - start.yaw_rad, 2 * math.pi))
-        moved = math.hypot(pose.x_m - start.x_m, pose.y_m - start.y_m) + _TURN_LEVER_M * turned
-        asked = self._asked_m
-        self._from, self._asked_m, self._moving_s = pose, 0.0, 0.0
-        return moved < _STUCK_SHARE * asked
+    def _note(self, kind: str, duration_s: float, text: str, ends: bool = False) -> None:
+        self._log.events.append(Event(self._step * self._dt_ns, kind, duration_s, text, ends))

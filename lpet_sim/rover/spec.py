@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -14,6 +14,10 @@ from lpet_sim.spec import Spec
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 MARS_100_M_PER_H_MPS = 100.0 / 3600.0
+WheelName = Literal[
+    "front_left", "front_right", "middle_left", "middle_right", "rear_left", "rear_right"
+]
+Failure = Literal["tipped", "entrapped", "hung_up", "stuck", "sliding"]
 
 
 class RoverSpec(Spec):
@@ -63,6 +67,58 @@ class Stop(Spec):
     duration_s: Positive
 
 
+class StuckWheel(Spec):
+    """A wheel whose drive is locked: it still steers, and is dragged by the others.
+
+    Attributes:
+        wheel: Which wheel.
+        start_s: When it begins, since the start.
+        duration_s: How long it lasts; None for as long as the drive.
+    """
+
+    wheel: WheelName
+    start_s: NotNegative
+    duration_s: Positive | None = None
+
+    @property
+    def end_s(self) -> float:
+        """When it is over, since the start [s]."""
+        return math.inf if self.duration_s is None else self.start_s + self.duration_s
+
+
+class FailureSpec(Spec):
+    """What counts as a failure, and which kinds of it end a drive; the others are recorded only.
+
+    All numbers but half a wheel radius are assumptions.
+
+    Attributes:
+        ends_on: Kinds that end the drive. ``tipped`` always does, listed or not: what follows is
+            no physics, since the model's deck and mast do not collide.
+        tip_angle_rad: ``tipped``: the body's tilt is beyond this.
+        sinkage_limit_m: ``entrapped``: a wheel stands deeper in the soil; None for half a radius.
+        sinkage_hold_s: For at least this long, so that a bump does not count.
+        belly_share: ``hung_up``: the belly carries more than this share of the weight, on average
+            over the window, and the rover is stuck meanwhile.
+        hung_up_window_s: Window of commanded motion for ``hung_up``.
+        stuck_share: ``stuck``: the body moves by less than this share of what it is commanded to.
+        stuck_window_s: Window of commanded motion for ``stuck``.
+        sliding_share: ``sliding``: driven forwards, the body moves backwards, by more than this
+            share of what it is commanded to.
+        sliding_window_s: Window of commanded motion for ``sliding``.
+    """
+
+    ends_on: tuple[Failure, ...] = ("tipped", "entrapped", "hung_up", "stuck")
+    tip_angle_rad: Annotated[float, Field(gt=0.0, le=math.pi / 2)] = math.radians(45.0)
+    sinkage_limit_m: Positive | None = None
+    sinkage_hold_s: NotNegative = 2.0
+    belly_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
+    hung_up_window_s: Positive = 10.0
+    stuck_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
+    stuck_window_s: Positive = 120.0
+    sliding_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
+    sliding_window_s: Positive = 10.0
+
+
 class DriveSpec(Spec):
     """A drive along waypoints.
 
@@ -76,6 +132,9 @@ class DriveSpec(Spec):
         acceleration_mps2: Ramp of the speed (assumption).
         stops: Halts, in order of distance.
         forced_slips: Forced slip events, in order of time and apart from each other.
+        stuck_wheels: Wheels whose drive is locked for a while, or for good; those of one wheel in
+            order of time and apart from each other.
+        failures: What counts as a failure, and which kinds end the drive.
         settle_s: Standstill before time 0, in which the suspension comes to rest.
         imu_rate_hz: Rate of the body's truth; must divide the physics rate.
         wheel_rate_hz: Rate of the wheels' truth; must divide the physics rate.
@@ -90,6 +149,8 @@ class DriveSpec(Spec):
     acceleration_mps2: Positive = 0.02
     stops: tuple[Stop, ...] = ()
     forced_slips: tuple[ForcedSlip, ...] = ()
+    stuck_wheels: tuple[StuckWheel, ...] = ()
+    failures: FailureSpec = FailureSpec()
     settle_s: NotNegative = 5.0
     imu_rate_hz: Positive = 100.0
     wheel_rate_hz: Positive = 20.0
@@ -113,4 +174,18 @@ class DriveSpec(Spec):
                     f"forced slip at {then.start_s} s begins before the one at {first.start_s} s "
                     "has ended; they must follow each other"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _one_lock_at_a_time(self) -> Self:
+        """Hold the times in which one wheel is stuck to be apart."""
+        of_wheel: dict[str, StuckWheel] = {}
+        for stuck in self.stuck_wheels:
+            before = of_wheel.get(stuck.wheel)
+            if before is not None and stuck.start_s < before.end_s:
+                raise ValueError(
+                    f"stuck wheel {stuck.wheel} at {stuck.start_s} s begins before the one at "
+                    f"{before.start_s} s has ended; they must follow each other"
+                )
+            of_wheel[stuck.wheel] = stuck
         return self
