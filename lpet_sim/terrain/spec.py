@@ -7,10 +7,13 @@ figures to hold a result against.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Self
+from typing import Annotated, Final, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from lpet_sim.errors import LpetError
+from lpet_sim.soil.load import load_soil
+from lpet_sim.soil.spec import FirmSoilSpec, SoilSpec
 from lpet_sim.spec import Spec
 from lpet_sim.terrain.rock_spec import (
     Fraction,
@@ -38,6 +41,7 @@ __all__ = [
 ]
 
 Hurst = Annotated[float, Field(gt=0.0, lt=1.0)]
+DEFAULT_SOIL: Final = "mars_sand"
 
 
 class ReliefSpec(Spec):
@@ -86,20 +90,36 @@ class CraterSpec(Spec):
         return self
 
 
+def _soil_by_name(soil: object) -> object:
+    """Put a soil of the library in place of its name, so that a manifest holds every number."""
+    try:
+        return load_soil(soil) if isinstance(soil, str) else soil
+    except LpetError as error:
+        raise ValueError(str(error)) from None
+
+
 class SoilClass(Spec):
     """One kind of ground.
 
     Attributes:
         name: What it is called.
         area_fraction: Share of the ground; the shares of a terrain sum to 1.
-        firm: True for bedrock and hard crust, False for loose soil in which wheels slip.
+        soil: What it is to a wheel; in a file also the name of a soil of the library, or the path
+            of a soil's YAML file.
         tone: Albedo relative to the terrain's mean.
     """
 
     name: Annotated[str, Field(min_length=1)]
     area_fraction: Fraction = 1.0
-    firm: bool = False
+    soil: Annotated[SoilSpec, BeforeValidator(_soil_by_name)] = Field(
+        default_factory=lambda: load_soil(DEFAULT_SOIL)
+    )
     tone: Annotated[float, Field(gt=0.0, le=3.0)] = 1.0
+
+    @property
+    def firm(self) -> bool:
+        """Whether it is bedrock or hard crust, not loose soil into which wheels sink."""
+        return isinstance(self.soil, FirmSoilSpec)
 
 
 class SunSpec(Spec):

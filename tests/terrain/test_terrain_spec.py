@@ -10,6 +10,7 @@ import pytest
 
 from lpet_sim.datasets import DataError, data_folder, data_path
 from lpet_sim.errors import SpecError, UnknownNameError
+from lpet_sim.soil.load import load_soil
 from lpet_sim.terrain.box import Box
 from lpet_sim.terrain.load import PRESETS, load_terrain_spec, preset_names
 from lpet_sim.terrain.spec import RockAbundanceSpec, RockTableSpec, TerrainSpec
@@ -25,6 +26,9 @@ BAD = [
     ({"rocks": {"kind": "heap"}}, "'abundance', 'table'"),
     ({"rocks": {"kind": "table", "rows": []}}, "at least 1 item"),
     ({"soils": [{"name": "a", "area_fraction": 0.4}]}, "must sum to 1"),
+    ({"soils": [{"name": "a", "soil": "jelly"}]}, "soils.0.soil.*choose one of bedrock"),
+    ({"soils": [{"name": "a", "soil": {"kind": "jelly"}}]}, "'mechanics', 'table', 'firm'"),
+    ({"soils": [{"name": "a", "firm": True}]}, "valid keys are name, area_fraction, soil, tone"),
     ({"sun": {"elevation_rad": -0.2}}, "sun.elevation_rad"),
     ({"albedo": {"mean": 1.2}}, "albedo.mean"),
     ({"seed": 3}, "unknown key 'seed'"),
@@ -48,6 +52,13 @@ def test_presets_have_the_abundances_of_their_sites() -> None:
         assert isinstance(rocks, RockAbundanceSpec)
         assert rocks.k == value
     assert load_terrain_spec("gale").dem is not None
+
+
+def test_a_terrain_holds_the_numbers_of_its_soils() -> None:
+    """A soil given by its name is whole in the spec, and firm by its kind."""
+    crust, drift = load_terrain_spec("exomars").soils
+    assert (crust.soil, drift.soil) == (load_soil("duricrust"), load_soil("mars_sand"))
+    assert (crust.firm, drift.firm) == (True, False)
 
 
 @pytest.mark.parametrize(("mapping", "sentence"), BAD)
