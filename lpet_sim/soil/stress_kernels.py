@@ -31,8 +31,7 @@ class Law(NamedTuple):
     """A soil, a wheel and a gravity as the numbers that the stresses need.
 
     Attributes:
-        radius: r, of the rim: slip is defined by it [m].
-        tip_radius: Radius of the grousers' tips, at which the soil shears [m].
+        radius: r, of the grousers' tips, at which the wheel rolls and the soil shears [m].
         width: b [m].
         pressure: Normal stress at the depth `depth_unit` [Pa].
         depth_unit: Depth in which the exponent counts [m].
@@ -40,7 +39,7 @@ class Law(NamedTuple):
         cohesion: c [Pa].
         tan_phi: Tangent of the angle of internal friction.
         shear_x: K along the wheel [m]; `shear_x_per_rad` is added for each radian of slip angle.
-        shear_y: K across the wheel [m].
+        shear_y: K across the wheel [m]; `shear_y_per_rad` likewise.
         peak: a0; `peak_slip` a1: ``theta_m = (a0 + a1 s) theta_1``.
         rear: b0; `rear_slip` b1: ``theta_2 = (b0 + b1 s) theta_1``.
         flank_linear: Resistance of soil pushed sideways, per width and depth [Pa].
@@ -48,7 +47,6 @@ class Law(NamedTuple):
     """
 
     radius: float
-    tip_radius: float
     width: float
     pressure: float
     depth_unit: float
@@ -60,6 +58,7 @@ class Law(NamedTuple):
     shear_x: float
     shear_x_per_rad: float
     shear_y: float
+    shear_y_per_rad: float
     peak: float
     peak_slip: float
     rear: float
@@ -77,7 +76,7 @@ class Motion(NamedTuple):
         exponent: n at this slip.
         peak: ``theta_m / theta_1``.
         rear: ``theta_2 / theta_1``.
-        shear_x: K along the wheel at this slip angle [m].
+        shear_x: K along the wheel at this slip angle [m]; `shear_y` that across it.
     """
 
     advance: float
@@ -86,6 +85,7 @@ class Motion(NamedTuple):
     peak: float
     rear: float
     shear_x: float
+    shear_y: float
 
 
 @njit(cache=True)
@@ -101,17 +101,18 @@ def motion_of(law: Law, slip: float, creep: float) -> Motion:
     exponent = law.exponent + law.exponent_slip * forward + law.exponent_skid * skid
     slip_angle = math.atan2(abs(creep), advance)
     shear_x = law.shear_x + law.shear_x_per_rad * slip_angle
+    shear_y = law.shear_y + law.shear_y_per_rad * slip_angle
     peak, rear = law.peak + law.peak_slip * forward, law.rear + law.rear_slip * forward
-    return Motion(advance, creep, exponent, peak, rear, shear_x)
+    return Motion(advance, creep, exponent, peak, rear, shear_x, shear_y)
 
 
 @njit(cache=True)
 def depth_at(law: Law, theta: float, entry: float) -> float:
     """Give the depth of the tips' circle below the surface [m].
 
-    ``z = r_s (cos theta - cos theta_1)``, written as a product so that nothing cancels.
+    ``z = r (cos theta - cos theta_1)``, written as a product so that nothing cancels.
     """
-    return 2.0 * law.tip_radius * math.sin(0.5 * (entry + theta)) * math.sin(0.5 * (entry - theta))
+    return 2.0 * law.radius * math.sin(0.5 * (entry + theta)) * math.sin(0.5 * (entry - theta))
 
 
 @njit(cache=True)
@@ -121,20 +122,20 @@ def normal_stress(law: Law, exponent: float, depth: float) -> float:
 
 
 @njit(cache=True)
-def shear_stress(law: Law, motion: Motion, theta: float, entry: float, sigma: float):  # type: ignore[no-untyped-def]
+def shear_stress(
+    law: Law, motion: Motion, theta: float, entry: float, sigma: float
+) -> tuple[float, float]:
     """Give the shear stress that the soil puts on the rim, along and across [Pa].
 
     The rim's displacement against soil at rest, from entry on, with ``a = v / (r omega)``:
-    ``j_x = r_s (theta_1 - theta) - r a (sin theta_1 - sin theta)`` and
+    ``j_x = r ((theta_1 - theta) - a (sin theta_1 - sin theta))`` and
     ``j_y = r creep (theta_1 - theta)``. Then ``tau = (c + sigma tan phi) (1 - exp(-|e|)) e / |e|``
     with ``e = (j_x / K_x, j_y / K_y)``: in no direction more than Mohr and Coulomb allow.
     """
     turned = entry - theta
-    along = law.tip_radius * turned - law.radius * motion.advance * (
-        math.sin(entry) - math.sin(theta)
-    )
-    e_x = along / motion.shear_x
-    e_y = law.radius * motion.creep * turned / law.shear_y
+    along = turned - motion.advance * (math.sin(entry) - math.sin(theta))
+    e_x = law.radius * along / motion.shear_x
+    e_y = law.radius * motion.creep * turned / motion.shear_y
     size = math.sqrt(e_x * e_x + e_y * e_y)
     if size < 1e-12:
         return 0.0, 0.0
@@ -150,7 +151,7 @@ def flank_resistance(law: Law, motion: Motion, theta: float, entry: float) -> fl
     shear is: ``1 - exp(-|j_y| / K_y)``.
     """
     z = max(0.0, depth_at(law, theta, entry))
-    moved = abs(law.radius * motion.creep * (entry - theta)) / law.shear_y
+    moved = abs(law.radius * motion.creep * (entry - theta)) / motion.shear_y
     return (law.flank_linear * z + law.flank_square * z * z) * -math.expm1(-moved)
 
 
@@ -160,13 +161,13 @@ def _add_stresses(
 ) -> None:
     """Add what an arc of `step` [rad] at `theta` contributes."""
     tau_x, tau_y = shear_stress(law, motion, theta, entry, sigma)
-    area = law.tip_radius * law.width * step
+    area = law.radius * law.width * step
     sine, cosine = math.sin(theta), math.cos(theta)
-    flank = flank_resistance(law, motion, theta, entry) * law.tip_radius * cosine * step
+    flank = flank_resistance(law, motion, theta, entry) * law.radius * cosine * step
     sums[VERTICAL] += area * (sigma * cosine + tau_x * sine)
     sums[DRAWBAR] += area * (tau_x * cosine - sigma * sine)
     sums[SIDE] -= area * tau_y + math.copysign(flank, motion.creep)
-    sums[TORQUE] += area * law.tip_radius * tau_x
+    sums[TORQUE] += area * law.radius * tau_x
     sums[COMPACTION] += area * sigma * sine
 
 

@@ -56,13 +56,13 @@ def wheel_forces(
 ) -> WheelForces:
     """Compute what a soil does to a rolling wheel in steady motion.
 
-    With ``r_s = r + h`` the radius of the grousers' tips and stresses from the entry angle
+    With r the radius of the grousers' tips (`rolling_radius`) and stresses from the entry angle
     ``theta_1``, at which the vertical force balances the load, to the rear angle ``theta_2``:
 
-        N = r_s b Integral (sigma cos + tau_x sin) dtheta
-        T = r_s b Integral (tau_x cos - sigma sin) dtheta
-        M = r_s^2 b Integral tau_x dtheta
-        S = -r_s b Integral tau_y dtheta - Integral R(theta) r_s cos dtheta
+        N = r b Integral (sigma cos + tau_x sin) dtheta
+        T = r b Integral (tau_x cos - sigma sin) dtheta
+        M = r^2 b Integral tau_x dtheta
+        S = -r b Integral tau_y dtheta - Integral R(theta) r cos dtheta
 
     and ``R`` the resistance of the soil that the sunk flank pushes aside.
 
@@ -93,7 +93,7 @@ def wheel_forces(
         drawbar_n=columns[DRAWBAR],
         side_n=columns[SIDE],
         torque_nm=columns[TORQUE],
-        sinkage_m=law.tip_radius * (1.0 - np.cos(entry)),
+        sinkage_m=law.radius * (1.0 - np.cos(entry)),
         compaction_n=columns[COMPACTION],
         entry_angle_rad=np.abs(entry),
         carried=entry > -ENTRY_LIMIT_RAD,
@@ -105,8 +105,7 @@ def law_of(soil: MechanicalSoilSpec, wheel: WheelSpec, gravity_mps2: float) -> L
     pressure, depth_unit = _pressure(soil, wheel.width_m, gravity_mps2)
     linear, square = flank_coefficients(soil, gravity_mps2)
     return Law(
-        radius=wheel.radius_m,
-        tip_radius=tip_radius(wheel),
+        radius=rolling_radius(wheel),
         width=wheel.width_m,
         pressure=pressure,
         depth_unit=depth_unit,
@@ -118,6 +117,7 @@ def law_of(soil: MechanicalSoilSpec, wheel: WheelSpec, gravity_mps2: float) -> L
         shear_x=soil.shear_modulus_x_m,
         shear_x_per_rad=soil.shear_modulus_x_per_rad_m,
         shear_y=soil.shear_modulus_y_m,
+        shear_y_per_rad=soil.shear_modulus_y_per_rad_m,
         peak=soil.peak_angle,
         peak_slip=soil.peak_angle_slip,
         rear=soil.rear_angle,
@@ -127,10 +127,10 @@ def law_of(soil: MechanicalSoilSpec, wheel: WheelSpec, gravity_mps2: float) -> L
     )
 
 
-def tip_radius(wheel: WheelSpec) -> float:
-    """Give the radius at which the soil shears, ``r_s = r + h`` [m].
+def rolling_radius(wheel: WheelSpec) -> float:
+    """Give the radius at which the wheel rolls and the soil shears, ``r = rim + h`` [m].
 
-    Soil between grousers is taken to be carried along, so that the wheel acts as a cylinder through
+    Slip is taken at it, so that a grousered wheel without slip does not plough. Soil between grousers is taken to be carried along, so that the wheel acts as a cylinder through
     their tips: true where many grousers are in the soil at a time, an assumption where few are.
 
     Reference:
