@@ -178,14 +178,23 @@ def shared_noise(before: CameraStep | None, after: CameraStep | None) -> Array:
 
 
 def diagnostics(steps: list[BodyStep], sightings: SightingStream) -> dict[str, Array]:
-    """Tell of each image how its motion was found: sightings, inliers, reduced_chi2, bridged."""
+    """Tell of each image how its motion was found.
+
+    Besides sightings, inliers, reduced_chi2 and bridged this is ``step_sigma_m``: the error of the
+    step's translation along its worst direction, 1 sigma [m].
+    """
     seen = [step.seen for step in steps]
     return {
         "sightings": np.diff(sightings.offsets).astype(float),
         "inliers": np.array([0.0] + [float(s.inliers) if s else 0.0 for s in seen]),
         "reduced_chi2": np.array([0.0] + [s.reduced_chi2 if s else 0.0 for s in seen]),
         "bridged": np.array([0.0] + [float(s is None) for s in seen]),
+        "step_sigma_m": np.array([0.0] + [_translation_sigma(step) for step in steps]),
     }
+
+
+def _translation_sigma(step: BodyStep) -> float:
+    return float(np.sqrt(np.linalg.eigvalsh(step.covariance[:3, :3])[-1]))
 
 
 def _in_body(seen: CameraStep, T_body_camera: SE3) -> BodyStep:

@@ -12,10 +12,16 @@ from lpet_sim.evaluation.attribution import ErrorAttribution
 from lpet_sim.evaluation.errors import SegmentDrift
 from lpet_sim.evaluation.requirement import Requirement, Verdict, VerdictLine
 from lpet_sim.evaluation.result import RunResult
+from lpet_sim.evaluation.slip_match import SlipMatch
+from lpet_sim.recording.arrays import NS_PER_S
 
 _CAUSES = (
     "scale: encoders' scale and noise, track width; slip: along the wheels; model: sideways slip, "
     "and the tilt of the ground, which wheels cannot see. Vectors add up, lengths do not."
+)
+_FOUND = (
+    "From dead reckoning and frame-to-frame vision alone. In time: onset within one image interval "
+    "of the true one. A slip that nothing forced is the ground's own."
 )
 
 
@@ -87,6 +93,35 @@ def attribution_table(attribution: ErrorAttribution) -> Table:
         ratio = length / attribution.distance_m
         table.add_row(cause, *(f"{c:+.4f}" for c in vector), f"{length:.4f}", f"{ratio:.3%}")
     return table
+
+
+def slip_table(matches: Sequence[SlipMatch]) -> Table:
+    """Make a table of the slips found by comparing vision with the wheels, beside the true ones."""
+    table = Table(title=Text("Slip found by comparing vision with the wheels"))
+    table.caption = Text(_FOUND, justify="left")
+    for heading in ("what truly happened", "found at [s]", "late [s]", "image interval [s]"):
+        table.add_column(Text(heading), justify="right")
+    for heading in ("found in time", "lost, found [m]", "lost, true [m]"):
+        table.add_column(Text(heading), justify="right")
+    for match in matches:
+        table.add_row(*_slip_cells(match))
+    return table
+
+
+def _slip_cells(match: SlipMatch) -> tuple[Text | str, ...]:
+    event, found, late = match.event, match.found, match.late_s
+    happened = "no forced slip"
+    if event is not None:
+        happened = f"forced slip at {event.t_ns / NS_PER_S:.1f} s for {event.duration_s:.1f} s"
+    return (
+        happened,
+        "not found" if found is None else f"{found.onset_ns / NS_PER_S:.1f}",
+        "-" if late is None else f"{late:+.1f}",
+        f"{match.interval_s:.1f}",
+        "-" if event is None else pass_or_fail(match.within_one_image),
+        "-" if found is None else f"{found.lost_m:.3f}",
+        f"{match.lost_true_m:.3f}",
+    )
 
 
 def pass_or_fail(passed: bool) -> Text:

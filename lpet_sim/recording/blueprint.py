@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 
 from lpet_sim.recording import layout
 from lpet_sim.recording.overview import EstimateFacts, Overview
+from lpet_sim.recording.wheel_curves import TITLES
 
 _SKY = (38, 32, 30, 255)
 _UP = (0.0, 0.0, 1.0)
@@ -20,7 +21,11 @@ _COLUMN_SHARE, _TITLE_SHARE = 0.75, 0.03
 _WIDE = 2.0
 # Room for the labels over the ends of the paths [m].
 _ABOVE = (0.0, 0.0, 3.0)
-_SLIP_RANGE = (-0.4, 1.1)
+_RANGES = {
+    "slip": rrb.ScalarAxis(range=(-0.4, 1.1)),
+    "slip_angle_deg": rrb.ScalarAxis(range=(-45.0, 45.0)),
+    "traction_over_load": rrb.ScalarAxis(range=(-1.0, 1.0)),
+}
 
 Part = rrb.Container | rrb.View
 Vector = tuple[float, float, float]
@@ -41,7 +46,7 @@ def _left(overview: Overview) -> rrb.Container:
     rows: list[Part] = [rrb.Tabs(_world(overview), _map(overview), _ride())]
     for parts in (
         [*_errors(overview), *_percent(overview)],
-        [*_slip(overview), *_counts(overview)],
+        _wheels(overview),
     ):
         if parts:
             rows.append(rrb.Horizontal(*parts))
@@ -51,8 +56,9 @@ def _left(overview: Overview) -> rrb.Container:
 def _right(overview: Overview) -> rrb.Container:
     rows = _eyes(overview)
     attitude = [view for e in overview.estimates for view in _attitude(e, overview)]
-    if attitude:
-        rows.append((rrb.Tabs(*attitude, active_tab=len(attitude) - 1), 0.2))
+    curves = [*attitude, *_counts(overview)]
+    if curves:
+        rows.append((rrb.Tabs(*curves, active_tab=max(len(attitude) - 1, 0)), 0.2))
     text = rrb.TextDocumentView(origin=layout.SUMMARY, name="Summary")
     log = rrb.TextLogView(origin=layout.EVENT_LOG, name="Events")
     left_over = max(0.2, 1.0 - sum(share for _, share in rows))
@@ -136,14 +142,22 @@ def _attitude(estimate: EstimateFacts, overview: Overview) -> list[Part]:
     return _curves(f"Attitude [deg]: {estimate.name}", [entity], overview)
 
 
-def _slip(overview: Overview) -> list[Part]:
-    if not overview.has_wheel_truth:
-        return []
+def _wheels(overview: Overview) -> list[Part]:
+    """Show how the wheels slip, and beside it what they stand in and carry."""
+    views = {quantity: _wheel_view(quantity, overview) for quantity in TITLES}
+    moving = [*views.pop("slip"), *views.pop("slip_angle_deg")]
+    standing = [view for found in views.values() for view in found]
+    return [rrb.Tabs(*tabs, active_tab=0) for tabs in (moving, standing) if tabs]
+
+
+def _wheel_view(quantity: str, overview: Overview) -> list[Part]:
+    entities = [layout.wheel_curve(quantity)] if overview.has_wheel_truth else []
+    title = TITLES[quantity]
+    if quantity == "slip" and overview.has_seen_slip:
+        entities.append(layout.SEEN_SLIP)
+        title = f"{title}, and as vision sees it (white)" if overview.has_wheel_truth else "Slip"
     # A wheel that hardly turns has a slip of any size; what matters lies between these.
-    entity = f"{layout.TRUTH_WHEELS}/slip"
-    slip = _curves("True wheel slip", [entity], overview, rrb.ScalarAxis(range=_SLIP_RANGE))
-    load = _curves("Wheel load [N]", [f"{layout.TRUTH_WHEELS}/load_n"], overview)
-    return [rrb.Tabs(*slip, *load)]
+    return _curves(title, entities, overview, _RANGES.get(quantity))
 
 
 def _counts(overview: Overview) -> list[Part]:

@@ -19,6 +19,8 @@ EVENT_LOG = "/events"
 
 ESTIMATES = "/estimates"
 ERRORS = "/errors"
+WHEEL_CURVES = "/curves/wheels"
+SEEN_SLIP = "/curves/seen_slip"
 
 WORLD = "/world"
 ROVER = "/world/rover"
@@ -36,6 +38,11 @@ EYE_COLUMNS = {"left": 0, "right": 1}
 def image(eye: str) -> str:
     """Name the entity of an eye's images."""
     return f"{CAMERAS[eye]}/image"
+
+
+def wheel_curve(quantity: str) -> str:
+    """Name the entity of a curve of the wheels."""
+    return f"{WHEEL_CURVES}/{quantity}"
 
 
 def slug(name: str) -> str:

@@ -18,13 +18,19 @@ from lpet_sim.recording.buffers import ColumnBuffers
 from lpet_sim.recording.calibration import Calibration
 from lpet_sim.recording.columns import Column, take_apart
 from lpet_sim.recording.estimate import Estimate
-from lpet_sim.recording.overview import ErrorsOverTime, EstimateFacts, Overview, estimate_facts
+from lpet_sim.recording.overview import (
+    ErrorsOverTime,
+    EstimateFacts,
+    Overview,
+    SlipOverTime,
+    estimate_facts,
+)
 from lpet_sim.recording.publish import publish
 from lpet_sim.recording.reader import open_store, read_body_truth, read_manifest
 from lpet_sim.recording.sketch import Sketch
 from lpet_sim.recording.store import StoreReader, StoreWriter
 from lpet_sim.recording.streams import SightingStream
-from lpet_sim.recording.visuals import ESTIMATE_COLOURS, Pen
+from lpet_sim.recording.visuals import ESTIMATE_COLOURS, TRUTH_COLOUR, Pen
 
 # Before, the percentage of a distance near zero says nothing.
 FIRST_METRES_M = 5.0
@@ -76,14 +82,30 @@ def add_estimates(
     path: Path | str,
     estimates: Sequence[tuple[Estimate, ErrorsOverTime | None]],
     path_out: Path | str | None = None,
+    slip: SlipOverTime | None = None,
 ) -> None:
-    """Overlay several estimates at once, each with its errors or None, as `add_estimate` does."""
+    """Overlay several estimates at once, as `add_estimate` does.
+
+    Args:
+        path: The recording.
+        estimates: The estimates, each with its errors or None.
+        path_out: Where the result goes; over the recording itself where None.
+        slip: Slip as the estimates show it, in place of any before; None leaves that as it is.
+
+    Raises:
+        RecordingError: The file is missing, truncated, or not a recording of this schema.
+        OutputError: The result cannot be written.
+    """
     slugs = [layout.slug(estimate.name) for estimate, _ in estimates]
     roots = (layout.ESTIMATES, layout.ERRORS, layout.PATHS)
     replaced = [f"{root}/{slug}/**" for root in roots for slug in slugs]
+    if slip is not None:
+        replaced.append(layout.SEEN_SLIP)
     with _rewriting(path, path_out, replaced) as copy:
         for estimate, errors in estimates:
             _overlay(copy, estimate, errors)
+        if slip is not None:
+            _draw_slip(copy, slip)
 
 
 _SIGHTING_ENTITIES = [
@@ -196,3 +218,11 @@ def _draw_errors(pen: Pen, facts: EstimateFacts, errors: ErrorsOverTime) -> None
         pen.curve_style(f"{entity}/percent", [facts.name], [rgba])
     pen.curve(f"{entity}/attitude_deg", errors.t_ns, np.degrees(errors.attitude_error_rad))
     pen.axis_curve_style(f"{entity}/attitude_deg", ["roll", "pitch", "yaw"])
+
+
+def _draw_slip(copy: _Copy, slip: SlipOverTime) -> None:
+    known = np.isfinite(slip.slip)
+    if known.any():
+        copy.pen.curve(layout.SEEN_SLIP, slip.t_ns[known], slip.slip[known])
+        copy.pen.curve_style(layout.SEEN_SLIP, ["seen by vision"], [TRUTH_COLOUR], 2.5)
+        copy.overview = replace(copy.overview, has_seen_slip=True)

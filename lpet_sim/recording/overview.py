@@ -35,6 +35,20 @@ class ErrorsOverTime(Protocol):
         ...
 
 
+class SlipOverTime(Protocol):
+    """Slip between images, as evaluation finds it by comparing vision with the wheels."""
+
+    @property
+    def t_ns(self) -> Ints:
+        """End of each interval since the start [ns], Shape (n,)."""
+        ...
+
+    @property
+    def slip(self) -> Array:
+        """Lost share of the wheels' motion, NaN where it is not known, Shape (n,)."""
+        ...
+
+
 @dataclass(frozen=True)
 class EstimateFacts:
     """An estimate in a recording.
@@ -86,7 +100,8 @@ class Overview:
         duration_s: Time of the last that happened [s].
         distance_m: Length of the true path [m].
         has_truth: Whether there is a truth.
-        has_wheel_truth: Whether slip and load are known.
+        has_wheel_truth: Whether slip, sinkage and forces of the wheels are known.
+        has_seen_slip: Whether slip was found by comparing vision with the wheels.
         has_rover: Whether the rover moves in the drawing.
         aspect: Width over height of an image, None without cameras.
         has_events: Whether something happened.
@@ -101,6 +116,7 @@ class Overview:
     distance_m: float = 0.0
     has_truth: bool = False
     has_wheel_truth: bool = False
+    has_seen_slip: bool = False
     has_rover: bool = False
     aspect: float | None = None
     has_events: bool = False

@@ -20,6 +20,7 @@ from lpet_sim.recording.streams import SightingStream
 from lpet_sim.recording.tracks import colours, images_of
 from lpet_sim.recording.truth import BodyTruth, Event, WheelTruth
 from lpet_sim.recording.visuals import EVENT_COLOUR, TRUTH_COLOUR, Pen
+from lpet_sim.recording.wheel_curves import WheelCurves
 
 
 class Sketch:
@@ -42,6 +43,7 @@ class Sketch:
         self._sighted = SightedImages(pen, draw_every)
         self._cloud = LandmarkCloud()
         self._path = Thinner()
+        self._curves: WheelCurves | None = None
         self._links = {"": layout.ROVER}
         self._moving: dict[str, MovingEntity] = {}
         self.overview = overview
@@ -67,13 +69,13 @@ class Sketch:
         self.overview = self.overview.covering(T_world_body.translation)
 
     def wheels(self, wheels: WheelTruth) -> None:
-        """Name the curves of the wheels; the curves are the exact streams themselves."""
-        if not self.overview.has_wheel_truth:
+        """Draw the curves of the wheels."""
+        if self._curves is None:
             count = wheels.slip.shape[1]
             names = self._wheels if len(self._wheels) == count else [f"{i}" for i in range(count)]
-            for quantity in ("slip", "load_n"):
-                self._pen.wheel_curve_style(f"{layout.TRUTH_WHEELS}/{quantity}", names)
+            self._curves = WheelCurves(self._pen, names)
             self.overview = replace(self.overview, has_wheel_truth=True)
+        self._curves.add(wheels)
 
     def links(self, links: Sequence[DrawnLink]) -> None:
         """Draw the parts of the rover, parents before what hangs on them."""
@@ -111,6 +113,8 @@ class Sketch:
         """Draw what is known at the end only: whole paths, landmarks, where events happened."""
         for moving in self._moving.values():
             moving.flush()
+        if self._curves is not None:
+            self._curves.flush()
         path = self._cloud.path()
         if self.overview.has_truth and len(path):
             length = float(np.linalg.norm(np.diff(path, axis=0), axis=-1).sum())

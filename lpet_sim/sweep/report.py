@@ -9,13 +9,19 @@ from rich.table import Table
 from rich.text import Text
 
 from lpet_sim.evaluation import Requirement
-from lpet_sim.evaluation.tables import attribution_table, result_table, segment_table, verdict_table
+from lpet_sim.evaluation.tables import (
+    attribution_table,
+    result_table,
+    segment_table,
+    slip_table,
+    verdict_table,
+)
 from lpet_sim.sweep.score import Score
 from lpet_sim.terrain.summary import TerrainSummary
 
 
 def score_tables(score: Score, requirement: Requirement) -> Iterator[Table]:
-    """Make the tables of a score: errors, verdict by line, segment drift, error by cause.
+    """Make the tables of a score: errors, verdict by line, segment drift, error by cause, slips.
 
     Args:
         score: The score.
@@ -29,6 +35,8 @@ def score_tables(score: Score, requirement: Requirement) -> Iterator[Table]:
         yield segment_table(score.results)
     if score.attribution is not None:
         yield attribution_table(score.attribution)
+    if score.slips:
+        yield slip_table(score.slips)
 
 
 def terrain_tables(summary: TerrainSummary) -> Iterator[Table]:

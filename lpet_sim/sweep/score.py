@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from estimators import ESTIMATORS, Estimator, build_estimator
 from estimators.dead_reckoning import DeadReckoning
+from estimators.frame_to_frame import FrameToFrame
 from lpet_sim.errors import RecordingError
 from lpet_sim.evaluation import RunResult, evaluate
 from lpet_sim.evaluation.attribution import ErrorAttribution, attribute_error
 from lpet_sim.evaluation.errors import ErrorSeries, error_series
+from lpet_sim.evaluation.slip_match import SlipMatch, match_slips
+from lpet_sim.evaluation.slip_onset import SlipReport, find_slip
 from lpet_sim.progress import Progress, silent, track
 from lpet_sim.recording.arrays import NS_PER_S
 from lpet_sim.recording.estimate import Estimate
@@ -21,6 +25,8 @@ from lpet_sim.recording.recording import Recording
 from lpet_sim.recording.streams import Measurements, WheelStream
 from lpet_sim.recording.trajectory import Trajectory
 from lpet_sim.recording.truth import Truth
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -32,12 +38,15 @@ class Score:
         estimates: The estimates found in it.
         results: Their scores, in the same order.
         attribution: Dead reckoning's error by cause, None where the truth holds no wheels.
+        slips: Forced slips with what was found of them by comparing vision with the wheels, and
+            other slips found so; None where one of the two estimates is not there.
     """
 
     recording: Recording
     estimates: tuple[Estimate, ...]
     results: tuple[RunResult, ...]
     attribution: ErrorAttribution | None
+    slips: tuple[SlipMatch, ...] | None = None
 
     @property
     def truth(self) -> Truth:
@@ -65,7 +74,12 @@ def estimate_recording(
     measurements = recording.measurements
     built = _fed_by(measurements) if asked is None else asked
     estimates = tuple(e.estimate(measurements) for e in track(built, len(built), progress))
-    add_estimates(path, [(estimate, _errors(estimate, recording)) for estimate in estimates])
+    slip = find_slip_in(recording, [*read_estimates(path).values(), *estimates])
+    add_estimates(
+        path,
+        [(estimate, _errors(estimate, recording)) for estimate in estimates],
+        slip=None if slip is None else slip.series,
+    )
     return estimates
 
 
@@ -112,7 +126,37 @@ def score_recording(path: Path, from_s: float | None = None) -> Score:
         raise RecordingError(f"{path} holds no estimates; run 'lpet estimate {path}' first")
     anchor_t_ns = None if from_s is None else round(from_s * NS_PER_S)
     results = tuple(evaluate(e, recording.truth, anchor_t_ns=anchor_t_ns) for e in estimates)
-    return Score(recording, estimates, results, attribute_dead_reckoning(recording))
+    split = attribute_dead_reckoning(recording)
+    return Score(recording, estimates, results, split, _match_slips(recording, estimates))
+
+
+def find_slip_in(recording: Recording, estimates: Iterable[Estimate]) -> SlipReport | None:
+    """Compare frame-to-frame vision with dead reckoning, or give None where one is not there.
+
+    Args:
+        recording: Its calibration says how far wheels are trusted.
+        estimates: Estimates of it; of two of one name the later counts.
+    """
+    by_name = {estimate.name: estimate for estimate in estimates}
+    vision, reckoned = by_name.get(FrameToFrame().name), by_name.get(DeadReckoning().name)
+    calibration = recording.measurements.calibration.wheels
+    if vision is None or reckoned is None or calibration is None:
+        return None
+    try:
+        return find_slip(vision, reckoned, calibration)
+    except RecordingError as error:
+        _log.info("no slip is looked for: %s", error)
+        return None
+
+
+def _match_slips(
+    recording: Recording, estimates: Sequence[Estimate]
+) -> tuple[SlipMatch, ...] | None:
+    report = find_slip_in(recording, estimates)
+    if report is None or recording.truth is None:
+        return None
+    reckoned = next(e for e in estimates if e.name == DeadReckoning().name)
+    return match_slips(report, recording.truth, reckoned)
 
 
 def attribute_dead_reckoning(recording: Recording) -> ErrorAttribution | None:
