@@ -54,13 +54,13 @@ def drive(scene: Scene, spec: DriveSpec, chunk_s: float = 10.0) -> Iterator[Trut
     Args:
         scene: A rover that stands at the first waypoint, from `build_scene`.
         spec: The drive.
-        chunk_s: Length of the chunks [s].
+        chunk_s: Length of the chunks, rounded to whole intervals of the control [s].
 
     Yields:
         The truth, piece by piece: each piece continues the last, and the first begins at time 0.
 
     Raises:
-        SpecError: A rate does not divide the physics rate.
+        SpecError: A rate does not divide the physics rate, or the body's is below the control's.
         PlanningError: The path leaves the drivable ground, or the rover is not at its start.
     """
     ticks = _ticks(spec, scene.spec.physics_dt_s, chunk_s)
@@ -70,12 +70,16 @@ def drive(scene: Scene, spec: DriveSpec, chunk_s: float = 10.0) -> Iterator[Trut
 
 
 def _ticks(spec: DriveSpec, dt_s: float, chunk_s: float) -> _Ticks:
-    return _Ticks(
-        body=_steps_per(spec.imu_rate_hz, dt_s, "imu_rate_hz"),
-        wheels=_steps_per(spec.wheel_rate_hz, dt_s, "wheel_rate_hz"),
-        control=_steps_per(spec.control_rate_hz, dt_s, "control_rate_hz"),
-        chunk=max(1, round(chunk_s / dt_s)),
-    )
+    body = _steps_per(spec.imu_rate_hz, dt_s, "imu_rate_hz")
+    control = _steps_per(spec.control_rate_hz, dt_s, "control_rate_hz")
+    if body > control:
+        raise SpecError(
+            f"imu_rate_hz {spec.imu_rate_hz:g} must be at least control_rate_hz "
+            f"{spec.control_rate_hz:g}, so that the body is sampled between two commands"
+        )
+    # A drive ends at a command. Chunks end there too, so that the last one is never without rows.
+    chunk = control * max(1, round(chunk_s / dt_s / control))
+    return _Ticks(body, _steps_per(spec.wheel_rate_hz, dt_s, "wheel_rate_hz"), control, chunk)
 
 
 def _steps_per(rate_hz: float, dt_s: float, name: str) -> int:
@@ -125,13 +129,13 @@ class _Drive:
         while not self._ended:
             if self._step % self._ticks.control == 0:
                 self._control()
+            if self._ended or (self._step and self._step % self._ticks.chunk == 0):
+                self._log.events = list(in_order(self._log.events))
+                yield self._log.take()
             if not self._ended:
                 self._scene.step()
                 self._step += 1
                 self._sample()
-            if (self._ended or self._step % self._ticks.chunk == 0) and not self._log.empty:
-                self._log.events = list(in_order(self._log.events))
-                yield self._log.take()
 
     def _settle(self) -> None:
         self._scene.command(np.zeros(6), np.zeros(6))
