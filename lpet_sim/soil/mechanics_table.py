@@ -129,7 +129,7 @@ def _invert(
     for j in range(sides.size):
         for i in range(slips.size):
             _at_side_force(grid[i], sides[j], 1.0 / max(1.0, 1.0 - slips[i]), curve[i])
-        _along_curve(slips, curve, ratios, sides[j], friction, value[:, j])
+        _along_curve(slips, curve, ratios, friction, value[:, j])
 
 
 @njit(cache=True)
@@ -154,7 +154,7 @@ def _at_side_force(row: Array, side: float, scale: float, out: Array) -> None:
 
 @njit(cache=True)
 def _along_curve(
-    slips: Array, curve: Array, ratios: Array, side: float, friction: float, value: Array
+    slips: Array, curve: Array, ratios: Array, friction: float, value: Array
 ) -> None:
     """Write the inverse of one curve of traction over slip, Shape (ratios, 4)."""
     peak = int(np.argmax(curve[:, _T]))

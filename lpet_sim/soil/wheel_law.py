@@ -130,8 +130,9 @@ def law_of(soil: MechanicalSoilSpec, wheel: WheelSpec, gravity_mps2: float) -> L
 def rolling_radius(wheel: WheelSpec) -> float:
     """Give the radius at which the wheel rolls and the soil shears, ``r = rim + h`` [m].
 
-    Slip is taken at it, so that a grousered wheel without slip does not plough. Soil between grousers is taken to be carried along, so that the wheel acts as a cylinder through
-    their tips: true where many grousers are in the soil at a time, an assumption where few are.
+    Slip is taken at it, so that a grousered wheel without slip does not plough. Soil between
+    grousers is taken to be carried along, so that the wheel acts as a cylinder through their tips:
+    true where many grousers are in the soil at a time, an assumption where few are.
 
     Reference:
         Ding et al., J. Terramechanics 48, 2011: shearing radius [recalled].
