@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
-from rich.progress import Progress as ProgressBar
-from rich.table import Table
 
+from lpet_sim.cli_rig import rig_app
 from lpet_sim.errors import LpetError
-from lpet_sim.progress import Progress
+from lpet_sim.terminal import bar, print_tables, wrote
 
 app = typer.Typer(
     name="lpet",
@@ -27,8 +23,8 @@ app = typer.Typer(
 )
 import_app = typer.Typer(help="Make a recording of a real data set.", no_args_is_help=True)
 app.add_typer(import_app, name="import")
+app.add_typer(rig_app, name="rig")
 
-_FILE_WIDTH = 140
 RecordingArgument = Annotated[Path, typer.Argument(metavar="RUN.rrd", help="A recording.")]
 SeedOption = Annotated[int, typer.Option(help="Seed of everything random.")]
 RequirementOption = Annotated[
@@ -48,31 +44,6 @@ def main() -> None:
         sys.exit(130)
 
 
-@contextmanager
-def _bar(title: str) -> Iterator[Progress]:
-    """Show a progress bar on stderr while the block runs; none where stderr is no terminal."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-    console = Console(stderr=True)
-    hidden = not console.is_terminal
-    with ProgressBar(*columns, TimeElapsedColumn(), console=console, disable=hidden) as bar:
-        task = bar.add_task(title, total=1.0)
-        yield lambda fraction: bar.update(task, completed=fraction)
-
-
-def _print_tables(tables: Iterable[Table]) -> None:
-    """Print tables, wide enough to be whole where no terminal sets the width."""
-    console = Console()
-    if not console.is_terminal:
-        console.width = _FILE_WIDTH
-    for table in tables:
-        console.print(table)
-
-
-def _wrote(*paths: Path) -> None:
-    for path in paths:
-        typer.echo(f"wrote {path}")
-
-
 @app.command()
 def simulate(
     spec: Annotated[Path, typer.Argument(metavar="SPEC.yaml", help="The traverse.")],
@@ -84,9 +55,9 @@ def simulate(
     from lpet_sim.sweep.traverse import TraverseSpec
 
     traverse = TraverseSpec.from_yaml(spec)
-    with _bar(f"driving {traverse.name}") as progress:
+    with bar(f"driving {traverse.name}") as progress:
         run(traverse, seed, out, progress)
-    _wrote(out)
+    wrote(out)
 
 
 @app.command()
@@ -100,10 +71,10 @@ def sight(
     from lpet_sim.vision.spec import FrontEndSpec
 
     front_end = FrontEndSpec() if spec is None else FrontEndSpec.from_yaml(spec)
-    with _bar(f"sighting {run.name}") as progress:
+    with bar(f"sighting {run.name}") as progress:
         summary = sight_recording(run, out or run, front_end, progress)
     typer.echo(str(summary))
-    _wrote(out or run)
+    wrote(out or run)
 
 
 @app.command()
@@ -117,10 +88,10 @@ def estimate(
     """Run estimators on a recording and lay their estimates over it."""
     from lpet_sim.sweep.score import estimate_recording
 
-    with _bar(f"estimating {run.name}") as progress:
+    with bar(f"estimating {run.name}") as progress:
         estimates = estimate_recording(run, estimator or None, progress)
     typer.echo(f"added {', '.join(estimate.name for estimate in estimates)}")
-    _wrote(run)
+    wrote(run)
 
 
 @app.command()
@@ -140,7 +111,7 @@ def evaluate(
 
     held_to = Requirement() if requirement is None else Requirement.from_yaml(requirement)
     score = score_recording(run, from_s)
-    _print_tables(score_tables(score, held_to))
+    print_tables(score_tables(score, held_to))
     if check and not all(held_to.check(result).passed for result in score.results):
         raise typer.Exit(1)
 
@@ -165,8 +136,8 @@ def terrain(
     from lpet_sim.sweep.scenery import draw_terrain
 
     summary, paths = draw_terrain(spec, seed, size, out)
-    _print_tables(terrain_tables(summary))
-    _wrote(*paths)
+    print_tables(terrain_tables(summary))
+    wrote(*paths)
 
 
 @import_app.command("kitti")
@@ -177,9 +148,9 @@ def import_kitti(
     """Import a KITTI odometry sequence."""
     from lpet_sim.sweep.importing import import_kitti as run
 
-    with _bar(f"importing {folder.name}") as progress:
+    with bar(f"importing {folder.name}") as progress:
         run(folder, out, progress)
-    _wrote(out)
+    wrote(out)
 
 
 @app.command()
@@ -191,7 +162,7 @@ def demo(
     from lpet_sim.study import run_demo
     from lpet_sim.sweep.report import score_tables
 
-    with _bar("drive, localize, score") as progress:
+    with bar("drive, localize, score") as progress:
         study = run_demo(out, seed, progress)
-    _print_tables(score_tables(study.score, study.requirement))
-    _wrote(*study.written)
+    print_tables(score_tables(study.score, study.requirement))
+    wrote(*study.written)

@@ -35,6 +35,7 @@ _RAMP_S: Final = 1.0
 _SAMPLE_S: Final = 0.05
 _PATIENCE: Final = 4.0  # a window may take so many times as long as the wheels are asked to
 _RUNAWAY: Final = 4.0  # a body faster than the wheels by this factor slides
+_LEAST_LOAD_N: Final = 1.0
 _TIPPED_COSINE: Final = math.cos(math.radians(45.0))
 
 
@@ -129,7 +130,6 @@ class _StraightDrive:
         self._dt_s = scene.spec.physics_dt_s
         self._sample_steps = max(1, round(_SAMPLE_S / self._dt_s))
         self._step = 0
-        self._traction: list[Array] = []
         self._windows: list[_Window] = []
 
     def run(self, heading: Heading) -> SlopePoint:
@@ -198,8 +198,6 @@ class _StraightDrive:
         t_ns = round(self._step * self._dt_s * NS_PER_S)
         self._log.add_body(t_ns, self._scene.body_row())
         self._log.add_wheels(t_ns, self._scene.wheel_row())
-        wheels = self._scene.wheel_state()
-        self._traction.append(wheels.traction_n.copy())
 
     def _runs_away(self) -> Ended | None:
         row = self._scene.body_row()
@@ -217,15 +215,13 @@ class _StraightDrive:
         truth = self._log.take()
         wheels = truth.wheels
         assert wheels is not None
-        traction = np.array(self._traction)
-        self._traction = []
-        load = np.maximum(wheels.load_n.mean(axis=0), 1.0)
+        load_n = wheels.load_n.mean(axis=0)
         return _Window(
             slip=_slip(wheels),
             slip_mean=wheels.slip[1:].mean(axis=1),
-            load_n=wheels.load_n.mean(axis=0),
-            traction=traction.mean(axis=0) / load,
-            sinkage_m=np.zeros(6),
+            load_n=load_n,
+            traction=wheels.traction_n.mean(axis=0) / np.maximum(load_n, _LEAST_LOAD_N),
+            sinkage_m=wheels.sinkage_m.mean(axis=0),
             drift_rad=self._drift(truth),
         )
 

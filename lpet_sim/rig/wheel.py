@@ -1,0 +1,207 @@
+"""The single-wheel rig: what one wheel pulls, sinks and needs, against its slip."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+import numpy as np
+from pydantic import Field
+
+from lpet_sim.recording.arrays import Array
+from lpet_sim.rover.frames import rover_frames
+from lpet_sim.rover.spec import RoverSpec
+from lpet_sim.soil.published import ReferenceWheelSpec
+from lpet_sim.soil.slip_table import (
+    ADVANCE,
+    LOAD_NODES,
+    SIDE_CREEP,
+    SIDE_NODES,
+    SINKAGE,
+    TORQUE,
+    SlipTable,
+    side_ratios,
+    traction_ratios,
+)
+from lpet_sim.soil.spec import MechanicalSoilSpec, SoilSpec
+from lpet_sim.soil.tabulate import tabulate
+from lpet_sim.soil.wheel_law import wheel_forces
+from lpet_sim.spec import Spec
+
+SLIPS: Final = tuple(round(s, 3) for s in np.arange(-0.70, 0.951, 0.025).tolist())
+_NOMINAL: Final = LOAD_NODES // 2
+
+
+class WheelRigSpec(Spec):
+    """A wheel, a soil, and the slips to hold the wheel at.
+
+    Attributes:
+        soil: The soil.
+        wheel: The wheel, with its load and the gravity of the test.
+        slip: Slips, increasing.
+        slip_angle_rad: Angle of the motion against the wheel's plane for the side force; the other
+            quantities are those of straight rolling.
+    """
+
+    soil: SoilSpec
+    wheel: ReferenceWheelSpec
+    slip: tuple[Annotated[float, Field(ge=-5.0, lt=1.0)], ...] = SLIPS
+    slip_angle_rad: Annotated[float, Field(ge=0.0, lt=math.radians(80.0))] = math.radians(15.0)
+
+
+@dataclass(frozen=True)
+class WheelCurve:
+    """One wheel on one soil against slip; every array has Shape (n,).
+
+    Attributes:
+        spec: What was asked.
+        slip: ``1 - v / (r omega)``.
+        drawbar_ratio: Drawbar pull over load; nan where the soil's curve does not reach.
+        torque_ratio: Torque over load and radius.
+        sinkage_m: Depth of the lowest point [m].
+        side_ratio: Side force over load at the spec's slip angle.
+    """
+
+    spec: WheelRigSpec
+    slip: Array
+    drawbar_ratio: Array
+    torque_ratio: Array
+    sinkage_m: Array
+    side_ratio: Array
+
+    @property
+    def traction_angle_rad(self) -> Array:
+        """Slope that the wheel climbs at this slip, ``atan(drawbar / load)`` [rad]."""
+        return np.arctan(self.drawbar_ratio)
+
+
+def rover_wheel(model: str) -> ReferenceWheelSpec:
+    """Give a wheel of a rover under its equal share of the weight.
+
+    Args:
+        model: Name of the rover model.
+
+    Raises:
+        UnknownNameError: There is no such rover model.
+    """
+    frames = rover_frames(RoverSpec(model=model))
+    return ReferenceWheelSpec(
+        name=f"wheel of {model}",
+        source=f"models/{model}.xml",
+        radius_m=frames.wheel_radius_m,
+        width_m=frames.wheel_width_m,
+        load_n=frames.mass_kg * frames.gravity_mps2 / len(frames.wheel_names),
+        gravity_mps2=frames.gravity_mps2,
+    )
+
+
+def wheel_rig_spec(
+    soil: SoilSpec,
+    wheel: ReferenceWheelSpec | None = None,
+    rover: str = "exomars",
+    load_n: float | None = None,
+    gravity_mps2: float | None = None,
+    slip_angle_rad: float = math.radians(15.0),
+) -> WheelRigSpec:
+    """Put a wheel rig together.
+
+    Args:
+        soil: The soil.
+        wheel: The wheel; None for that of the rover.
+        rover: Name of the rover model.
+        load_n: Load [N]; None for the wheel's own.
+        gravity_mps2: Gravity [m/s^2]; None for that of the wheel's test.
+        slip_angle_rad: Slip angle of the side force [rad].
+
+    Raises:
+        UnknownNameError: There is no such rover model.
+        SpecError: A value out of its range.
+    """
+    of = wheel or rover_wheel(rover)
+    test = {"load_n": load_n, "gravity_mps2": gravity_mps2}
+    given = {name: value for name, value in test.items() if value is not None}
+    values = {
+        "soil": soil,
+        "wheel": {**of.model_dump(), **given},
+        "slip_angle_rad": slip_angle_rad,
+    }
+    return WheelRigSpec.from_mapping(values, "wheel rig")
+
+
+def run_wheel_rig(spec: WheelRigSpec) -> WheelCurve:
+    """Hold a wheel at every slip of a spec.
+
+    A soil given by its mechanics is asked through the forward law. One that is given as a curve or
+    is firm has no more than its slip table, which is read backwards.
+
+    Args:
+        spec: What to run.
+    """
+    if isinstance(spec.soil, MechanicalSoilSpec):
+        return _by_mechanics(spec, spec.soil)
+    wheel = spec.wheel
+    table = tabulate(spec.soil, wheel.bare(), wheel.load_n, wheel.gravity_mps2)
+    return curve_of_table(spec, table)
+
+
+def _by_mechanics(spec: WheelRigSpec, soil: MechanicalSoilSpec) -> WheelCurve:
+    slip, wheel = np.array(spec.slip), spec.wheel
+    load, creep = wheel.load_n, (1 - slip) * math.tan(spec.slip_angle_rad)
+    ahead = wheel_forces(soil, wheel, slip, 0.0, load, wheel.gravity_mps2)
+    aslant = wheel_forces(soil, wheel, slip, creep, load, wheel.gravity_mps2)
+    return WheelCurve(
+        spec=spec,
+        slip=slip,
+        drawbar_ratio=ahead.drawbar_n / load,
+        torque_ratio=ahead.torque_nm / (load * wheel.radius_m),
+        sinkage_m=ahead.sinkage_m,
+        side_ratio=np.abs(aslant.side_n) / load,
+    )
+
+
+def curve_of_table(spec: WheelRigSpec, table: SlipTable) -> WheelCurve:
+    """Read a slip table backwards, at its nominal load.
+
+    Args:
+        spec: What to run.
+        table: The table of the spec's soil and wheel.
+    """
+    slip, ratio = np.array(spec.slip), traction_ratios()
+    value = table.value[_NOMINAL, :, 0]
+    drawbar = _back(slip, 1 - value[:, ADVANCE], ratio)
+    return WheelCurve(
+        spec=spec,
+        slip=slip,
+        drawbar_ratio=drawbar,
+        torque_ratio=np.interp(drawbar, ratio, value[:, TORQUE]),
+        sinkage_m=np.interp(drawbar, ratio, value[:, SINKAGE]),
+        side_ratio=_side_of_table(slip, spec.slip_angle_rad, table),
+    )
+
+
+def _back(wanted: Array, rising: Array, ratio: Array) -> Array:
+    """Find where a curve that does not fall takes the wanted values; nan beyond its ends."""
+    distinct = np.r_[True, np.diff(rising) > 0]
+    return np.interp(wanted, rising[distinct], ratio[distinct], left=np.nan, right=np.nan)
+
+
+def _side_of_table(slip: Array, slip_angle_rad: float, table: SlipTable) -> Array:
+    """Find the side force over load at which a wheel of given slip moves at a slip angle."""
+    ratio, side = traction_ratios(), side_ratios()
+    value = table.value[_NOMINAL]
+    creep = np.empty((len(slip), SIDE_NODES))
+    for j in range(SIDE_NODES):
+        traction = _back(slip, 1 - value[:, j, ADVANCE], ratio)
+        creep[:, j] = np.interp(traction, ratio, value[:, j, SIDE_CREEP])
+    wanted = (1 - slip) * math.tan(slip_angle_rad)
+    return np.array([_first_reach(w, row, side) for w, row in zip(wanted, creep, strict=True)])
+
+
+def _first_reach(wanted: float, creep: Array, side: Array) -> float:
+    """Find the least side force whose creep is the wanted one; nan where none is."""
+    known = np.isfinite(creep)
+    if not known.any() or np.nanmax(creep) < wanted:
+        return math.nan
+    rising = np.maximum.accumulate(creep[known])
+    return float(np.interp(wanted, rising, side[known]))

@@ -1,0 +1,47 @@
+"""What commands show on a terminal: a progress bar, tables, and the files that they wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as ProgressBar
+from rich.table import Table
+
+from lpet_sim.progress import Progress
+
+_FILE_WIDTH = 140
+
+
+@contextmanager
+def bar(title: str) -> Iterator[Progress]:
+    """Show a progress bar on stderr while the block runs; none where stderr is no terminal."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    console = Console(stderr=True)
+    hidden = not console.is_terminal
+    with ProgressBar(*columns, TimeElapsedColumn(), console=console, disable=hidden) as shown:
+        task = shown.add_task(title, total=1.0)
+        yield lambda fraction: shown.update(task, completed=fraction)
+
+
+def print_tables(tables: Iterable[Table]) -> None:
+    """Print tables, wide enough to be whole where no terminal sets the width."""
+    console = Console()
+    if not console.is_terminal:
+        console.width = _FILE_WIDTH
+    for table in tables:
+        console.print(table)
+
+
+def say(text: str) -> None:
+    """Print one line of plain text, however long."""
+    Console(soft_wrap=True, highlight=False).print(text, markup=False)
+
+
+def wrote(*paths: Path) -> None:
+    """Name the files that were written."""
+    for path in paths:
+        say(f"wrote {path}")
