@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+from lpet_sim.soil.mechanics_table import mechanics_table
 from lpet_sim.soil.plain_laws import firm_table, measured_table
 from lpet_sim.soil.slip_table import SlipTable
 from lpet_sim.soil.spec import FirmSoilSpec, MeasuredSoilSpec, SoilSpec, WheelSpec
@@ -25,6 +26,4 @@ def tabulate(
         return firm_table(soil, nominal_load_n)
     if isinstance(soil, MeasuredSoilSpec):
         return measured_table(soil, nominal_load_n)
-    from lpet_sim.soil.mechanics_table import mechanics_table
-
     return mechanics_table(soil, wheel, nominal_load_n, gravity_mps2)

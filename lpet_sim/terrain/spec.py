@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 Hurst = Annotated[float, Field(gt=0.0, lt=1.0)]
-DEFAULT_SOIL: Final = "mars_sand"
+DEFAULT_SOIL: Final = "mars_regolith"
 
 
 class ReliefSpec(Spec):

@@ -57,7 +57,7 @@ def test_presets_have_the_abundances_of_their_sites() -> None:
 def test_a_terrain_holds_the_numbers_of_its_soils() -> None:
     """A soil given by its name is whole in the spec, and firm by its kind."""
     crust, drift = load_terrain_spec("exomars").soils
-    assert (crust.soil, drift.soil) == (load_soil("duricrust"), load_soil("mars_sand"))
+    assert (crust.soil, drift.soil) == (load_soil("duricrust"), load_soil("mars_regolith"))
     assert (crust.firm, drift.firm) == (True, False)
 
 
