@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,6 +17,11 @@ from lpet_sim.recording.truth import Event, Truth, WheelTruth
 
 Triple = tuple[float, float, float]
 FORCED_SLIP = "forced_slip"
+MODEL = "model"
+CAUSES = ("scale", FORCED_SLIP, "slip", "side_slip", MODEL)
+"""The causes of dead reckoning's error, in the order in which they are taken away."""
+
+_LEAST_COSINE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -26,9 +32,11 @@ class ErrorAttribution:
         distance_m: Distance truly driven [m].
         total_m: The whole error [m]: the sum of the contributions.
         contributions_m: Error vector of each cause [m]: ``scale`` (scale and noise of the
-            encoders, track width), ``forced_slip``, ``slip`` (the wheels' own, along the wheel)
-            and ``model`` (what remains with exact angles and no slip: sliding sideways, and the
-            tilt of the ground, which wheels do not measure; it fills the vertical).
+            encoders, track width), ``forced_slip`` (turns of the wheels while the rover was held),
+            ``slip`` (the wheels' own, along the wheel), ``side_slip`` (their motion across their
+            plane) and ``model`` (what remains with every wheel's motion known in its own plane's
+            frame: the tilt of the ground, which wheels do not measure and which fills the vertical,
+            and the play of the suspension under a body taken as rigid).
     """
 
     distance_m: float
@@ -49,15 +57,17 @@ def attribute_error(
 ) -> ErrorAttribution:
     """Split the endpoint error of dead reckoning by cause.
 
-    Four streams are reckoned: the measured one (error e1), the true wheel angles (e2), those
-    without the turns of forced slip (e3), and those with each turn shortened by the wheel's slip,
-    ``(1 - s) d_angle`` (e4). Then ``scale = e1 - e2``, ``forced_slip = e2 - e3``,
-    ``slip = e3 - e4``, ``model = e4``, whose sum is e1.
+    Five streams are reckoned: the measured one (error e1), the true wheel angles (e2), those
+    without the turns of forced slip (e3), those with each turn shortened by the wheel's slip,
+    ``(1 - s) d_angle`` (e4), and these turned into the direction of each wheel's motion, as if it
+    were steered there (e5). Then ``scale = e1 - e2``, ``forced_slip = e2 - e3``,
+    ``slip = e3 - e4``, ``side_slip = e4 - e5``, ``model = e5``, whose sum is e1.
 
     Args:
         measured: Encoder readings.
         truth: Truth with wheels and events of the same traverse.
-        dead_reckon: Dead reckoning as a function of a wheel stream, from the given start.
+        dead_reckon: Dead reckoning as a function of a wheel stream, from the given start. It must
+            take every wheel as steered, for a wheel that is fixed slips sideways too.
 
     Returns:
         The error and its parts.
@@ -69,32 +79,67 @@ def attribute_error(
         raise RecordingError("the truth holds no wheels: only a simulated drive can be attributed")
     forced = [event for event in truth.events if event.kind == FORCED_SLIP]
     streams = [measured, *counterfactual_streams(truth.wheels, forced)]
-    e1, e2, e3, e4 = (_endpoint_error(dead_reckon(stream), truth.trajectory) for stream in streams)
-    parts = {"scale": e1 - e2, FORCED_SLIP: e2 - e3, "slip": e3 - e4, "model": e4}
+    errors = [_endpoint_error(dead_reckon(stream), truth.trajectory) for stream in streams]
+    parts = {
+        cause: e - e_without
+        for cause, (e, e_without) in zip(CAUSES, pairwise(errors), strict=False)
+    }
+    parts[MODEL] = errors[-1]
     return ErrorAttribution(
         distance_m=float(distance_driven_m(truth.trajectory)[-1]),
-        total_m=_triple(e1),
+        total_m=_triple(errors[0]),
         contributions_m={cause: _triple(vector) for cause, vector in parts.items()},
     )
 
 
 def counterfactual_streams(
     wheels: WheelTruth, forced: list[Event]
-) -> tuple[WheelStream, WheelStream, WheelStream]:
-    """Make exact wheel streams: as turned, without forced slip, and without any slip.
+) -> tuple[WheelStream, WheelStream, WheelStream, WheelStream]:
+    """Make exact wheel streams: as turned, without forced slip, without slip, and as moved.
+
+    The last has no slip along the wheels and points each along its motion.
 
     Args:
-        wheels: True wheel states; the slip of a sample is the mean since the sample before.
+        wheels: True wheel states; slip and slip angle of a sample are means since the one before.
         forced: The forced slip events.
 
     Returns:
-        Three streams at the truth's times.
+        Four streams; the first three at the truth's times.
     """
     turns = np.diff(wheels.drive_angle_rad, axis=0)
     free = 1.0 - _share_inside(wheels, forced)[:, None]
     made = (turns, turns * free, turns * free * (1.0 - wheels.slip[1:]))
     as_turned, unforced, gripping = (_stream(wheels, turn) for turn in made)
-    return as_turned, unforced, gripping
+    return as_turned, unforced, gripping, _as_moved(wheels, made[-1])
+
+
+def _as_moved(wheels: WheelTruth, turns: Array) -> WheelStream:
+    """Steer each wheel into its motion, by turns that are its motion along its plane, (n - 1, w).
+
+    A wheel that goes v along its plane goes ``|v| tan(angle)`` to its left: in all
+    ``v / cos(angle)`` at ``steer + sign(v) angle``. That direction holds for one interval, and a
+    reader takes the mean of both ends: so a second sample a nanosecond before each next one ends
+    the interval with the steering that it began with.
+    """
+    angle = wheels.slip_angle_rad[1:]
+    middle = 0.5 * (wheels.steer_angle_rad[1:] + wheels.steer_angle_rad[:-1])
+    heading = middle + np.sign(turns) * angle
+    # A wheel that only slides sideways has a right angle here; its turn is then 0 to rounding.
+    rolled = np.cumsum(turns / np.maximum(np.cos(angle), _LEAST_COSINE), axis=0)
+    begin, end = wheels.t_ns[:-1], wheels.t_ns[1:] - 1
+    start = wheels.drive_angle_rad[:1]
+    after = start + rolled
+    before = np.concatenate([start, after[:-1]])
+    return WheelStream(
+        np.append(np.stack([begin, end], axis=1).reshape(-1), wheels.t_ns[-1]),
+        np.concatenate([_interleaved(before, after), after[-1:]]),
+        np.concatenate([_interleaved(heading, heading), heading[-1:]]),
+    )
+
+
+def _interleaved(first: Array, second: Array) -> Array:
+    """Put the rows of two arrays in turn, Shape (2 n, w)."""
+    return np.stack([first, second], axis=1).reshape(-1, first.shape[1])
 
 
 def _share_inside(wheels: WheelTruth, events: list[Event]) -> Array:

@@ -46,9 +46,11 @@ class SlipMatch:
     @property
     def text(self) -> str:
         """One line for a reader."""
-        return f"{self._happened()} -> {self._told()}"
+        return f"{self.happened} -> {self._told()}"
 
-    def _happened(self) -> str:
+    @property
+    def happened(self) -> str:
+        """What truly happened, in a few words."""
         if self.event is None:
             return "no forced slip"
         return f"forced slip at {_clock(self.event.t_ns)} for {self.event.duration_s:.1f} s"

@@ -16,8 +16,8 @@ from lpet_sim.evaluation.slip_match import SlipMatch
 from lpet_sim.recording.arrays import NS_PER_S
 
 _CAUSES = (
-    "scale: encoders' scale and noise, track width; slip: along the wheels; model: sideways slip, "
-    "and the tilt of the ground, which wheels cannot see. Vectors add up, lengths do not."
+    "scale: encoders' scale and noise, track width; slip: along the wheels; side_slip: across "
+    "them; model: the tilt of the ground, which wheels cannot see. Vectors add up, lengths do not."
 )
 _FOUND = (
     "From dead reckoning and frame-to-frame vision alone. In time: onset within one image interval "
@@ -99,9 +99,8 @@ def slip_table(matches: Sequence[SlipMatch]) -> Table:
     """Make a table of the slips found by comparing vision with the wheels, beside the true ones."""
     table = Table(title=Text("Slip found by comparing vision with the wheels"))
     table.caption = Text(_FOUND, justify="left")
-    for heading in ("what truly happened", "found at [s]", "late [s]", "image interval [s]"):
-        table.add_column(Text(heading), justify="right")
-    for heading in ("found in time", "lost, found [m]", "lost, true [m]"):
+    table.add_column(Text("what truly happened"))
+    for heading in ("found at", "late (of one image)", "lost [m] (true)"):
         table.add_column(Text(heading), justify="right")
     for match in matches:
         table.add_row(*_slip_cells(match))
@@ -109,18 +108,17 @@ def slip_table(matches: Sequence[SlipMatch]) -> Table:
 
 
 def _slip_cells(match: SlipMatch) -> tuple[Text | str, ...]:
-    event, found, late = match.event, match.found, match.late_s
-    happened = "no forced slip"
-    if event is not None:
-        happened = f"forced slip at {event.t_ns / NS_PER_S:.1f} s for {event.duration_s:.1f} s"
+    found, late = match.found, match.late_s
+    lost = "-" if found is None else f"{found.lost_m:.3f}"
+    in_time: Text | str = "-"
+    if match.event is not None:
+        told = "" if late is None else f"{late:+.1f} s ({match.interval_s:.1f} s) "
+        in_time = Text(told).append_text(pass_or_fail(match.within_one_image))
     return (
-        happened,
-        "not found" if found is None else f"{found.onset_ns / NS_PER_S:.1f}",
-        "-" if late is None else f"{late:+.1f}",
-        f"{match.interval_s:.1f}",
-        "-" if event is None else pass_or_fail(match.within_one_image),
-        "-" if found is None else f"{found.lost_m:.3f}",
-        f"{match.lost_true_m:.3f}",
+        match.happened,
+        "not found" if found is None else f"{found.onset_ns / NS_PER_S:.1f} s",
+        in_time,
+        f"{lost} ({match.lost_true_m:.3f})",
     )
 
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from estimators import ESTIMATORS, Estimator, build_estimator
 from estimators.dead_reckoning import DeadReckoning
 from estimators.frame_to_frame import FrameToFrame
@@ -162,10 +164,16 @@ def _match_slips(
 def attribute_dead_reckoning(recording: Recording) -> ErrorAttribution | None:
     """Split dead reckoning's error by cause, or give None where wheels are not known."""
     measurements, truth = recording.measurements, recording.truth
-    if measurements.wheels is None or truth is None or truth.wheels is None:
+    wheels, declared = measurements.wheels, measurements.calibration.wheels
+    if wheels is None or declared is None or truth is None or truth.wheels is None:
         return None
+    all_steered = declared.model_copy(update={"steerable": (True,) * len(declared.steerable)})
+    calibration = measurements.calibration.model_copy(update={"wheels": all_steered})
 
-    def dead_reckon(wheels: WheelStream) -> Trajectory:
-        return DeadReckoning().estimate(replace(measurements, wheels=wheels)).trajectory
+    def dead_reckon(stream: WheelStream) -> Trajectory:
+        told = replace(measurements, calibration=calibration, wheels=stream)
+        return DeadReckoning().estimate(told).trajectory
 
-    return attribute_error(measurements.wheels, truth, dead_reckon)
+    # What a fixed wheel's encoder says of its steering is noise, which dead reckoning passes over.
+    steer = wheels.steer_angle_rad * np.array(declared.steerable, dtype=float)
+    return attribute_error(replace(wheels, steer_angle_rad=steer), truth, dead_reckon)

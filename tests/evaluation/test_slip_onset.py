@@ -76,8 +76,10 @@ def _truth(path: Trajectory, *events: Event) -> Truth:
     return Truth(BodyTruth(path.t_ns, path.T_world_body, zero, zero.copy()), None, events)
 
 
-def _find(slip: np.ndarray, **more: float) -> SlipReport:
-    vision, wheels, _ = _drive(slip, **more)
+def _find(
+    slip: np.ndarray, wheel_mps: float = SPEED_MPS, noise_seed: int | None = None
+) -> SlipReport:
+    vision, wheels, _ = _drive(slip, wheel_mps, noise_seed)
     return find_slip(vision, wheels, WHEELS)
 
 

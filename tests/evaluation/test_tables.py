@@ -7,12 +7,16 @@ from rich.table import Table
 
 from lpet_sim.evaluation import Requirement, evaluate, failed
 from lpet_sim.evaluation.attribution import ErrorAttribution
+from lpet_sim.evaluation.slip_match import SlipMatch
+from lpet_sim.evaluation.slip_onset import SlipFound
 from lpet_sim.evaluation.tables import (
     attribution_table,
     result_table,
     segment_table,
+    slip_table,
     verdict_table,
 )
+from lpet_sim.recording.truth import Event
 from tests.evaluation.trajectories import as_estimate, as_truth, scaled, straight
 
 
@@ -69,3 +73,23 @@ def test_the_causes_of_the_error_are_rows() -> None:
     text = _text(attribution_table(split))
     for part in ("scale", "slip", "total", "+0.4000", "5.000%"):
         assert part in text
+
+
+def test_a_slip_is_told_with_its_delay_and_what_it_cost() -> None:
+    """Found in time, found late, missed, and found without anything forced."""
+    event = Event(300_000_000_000, "forced_slip", 5.0)
+    times = (300_200_000_000, 305_000_000_000, 306_000_000_000, (298_800_000_000, 302_400_000_000))
+    found = SlipFound(*times, lost_m=0.137, slip=0.7, sigmas=5.0)
+    matches = [
+        SlipMatch(event, found, 0.139, 3.6),
+        SlipMatch(event, found, 0.139, 0.1),
+        SlipMatch(event, None, 0.139, 3.6),
+        SlipMatch(None, found, 0.139, 3.6),
+    ]
+    table = slip_table(matches)
+    text = _text(table)
+    for part in ("forced slip at 300.0 s for 5.0 s", "300.2 s", "0.137 (0.139)", "- (0.139)"):
+        assert part in text
+    late = [str(cell) for cell in table.columns[2].cells]
+    assert late == ["+0.2 s (3.6 s) PASS", "+0.2 s (0.1 s) FAIL", "FAIL", "-"]
+    assert "no forced slip" in text and "not found" in text
