@@ -1,4 +1,7 @@
-"""The rigs' results as CSV: one row for a point, units in the header."""
+"""The rigs' results as CSV: one row for a point, units in the header.
+
+``slip`` is ``1 - v / (r omega)`` everywhere; ``slip_or_skid`` is ``r omega / v - 1`` below 0.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ import numpy as np
 from lpet_sim.outputs import whole_file
 from lpet_sim.rig.slope import SlopeReport
 from lpet_sim.rig.slope_drive import SlopePoint
-from lpet_sim.rig.wheel import WheelCurve
+from lpet_sim.rig.wheel import WheelCurve, slip_scale
 from lpet_sim.rover.mjcf import WHEELS
 
 Cell = str | float
@@ -32,6 +35,7 @@ SLOPE_HEADER = (
 )
 WHEEL_HEADER = (
     "slip_percent",
+    "slip_or_skid_percent",
     "drawbar_over_load",
     "traction_angle_deg",
     "sinkage_mm",
@@ -82,6 +86,7 @@ def _wheel_rows(curve: WheelCurve) -> Iterable[list[Cell]]:
     columns = np.column_stack(
         [
             100 * curve.slip,
+            100 * slip_scale(curve.slip),
             curve.drawbar_ratio,
             np.degrees(curve.traction_angle_rad),
             1e3 * curve.sinkage_m,

@@ -1,72 +1,80 @@
-"""Measured rows beside the single-wheel rig, and how far its curve is from them."""
+"""Measured rows beside the wheel rig, and how far the law's prediction is from them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
+from lpet_sim.datasets import DataError
 from lpet_sim.recording.arrays import Array
-from lpet_sim.rig.wheel import WheelCurve, WheelRigSpec
+from lpet_sim.rig.wheel import WheelRigSpec
+from lpet_sim.soil.measured_wheels import (
+    PredictionError,
+    WheelName,
+    measured_wheel,
+    prediction_error,
+    straight,
+)
+from lpet_sim.soil.spec import MechanicalSoilSpec
+from lpet_sim.soil.wheel_law import rolling_radius
+
+_WHEELS: Final[dict[str, WheelName]] = {"cmu_grouser": "grouser", "cmu_smooth": "smooth"}
+_SOILS: Final = ("cmu_sand", "cmu_sand_smooth")
 
 
 @dataclass(frozen=True)
 class WheelMeasurements:
-    """What others measured with one wheel on one soil, rolling straight; arrays of Shape (n,).
+    """What others measured with the rig's wheel on its soil, rolling straight; Shape (n,).
 
     Attributes:
         label: What the legend calls it, with its source.
-        slip: ``1 - v / (r omega)``.
+        slip: ``1 - v / (r omega)`` at the radius at which the law takes it, the tips of the
+            grousers; minus infinity for a locked wheel.
         drawbar_ratio: Drawbar pull over load.
-        sinkage_m: Sinkage [m].
+        sinkage_m: Sinkage [m]; nan where it was not recorded.
+        error: Of the law's prediction of all rows, each at its measured load.
+        error_driving: Of those with slip of 0 or more.
+        error_skidding: Of those below.
     """
 
     label: str
     slip: Array
     drawbar_ratio: Array
     sinkage_m: Array
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """Law less measured over the rows within the curve's range of slip.
-
-    Attributes:
-        rows: How many rows lie there.
-        drawbar_rms: RMS of drawbar pull over load.
-        drawbar_mean: Its mean.
-        sinkage_rms_m: RMS of sinkage [m].
-        sinkage_mean_m: Its mean [m].
-    """
-
-    rows: int
-    drawbar_rms: float
-    drawbar_mean: float
-    sinkage_rms_m: float
-    sinkage_mean_m: float
+    error: PredictionError
+    error_driving: PredictionError
+    error_skidding: PredictionError
 
 
 def measured_beside(spec: WheelRigSpec) -> tuple[WheelMeasurements, ...]:
-    """Give what was measured with the rig's wheel on its soil; none where the data are absent."""
-    del spec
-    return ()
-
-
-def misfit(curve: WheelCurve, rows: WheelMeasurements) -> Misfit:
-    """Compare a curve, in straight lines between its slips, with measured rows.
+    """Give what was measured with the rig's wheel on its soil; none where the data are absent.
 
     Args:
-        curve: The curve.
-        rows: At least one of them within the curve's range of slip.
+        spec: The rig. Carnegie Mellon's two wheels on their sand are the only ones there are.
     """
-    inside = (rows.slip >= curve.slip[0]) & (rows.slip <= curve.slip[-1])
-    slip = rows.slip[inside]
-    drawbar = np.interp(slip, curve.slip, curve.drawbar_ratio) - rows.drawbar_ratio[inside]
-    sinkage = np.interp(slip, curve.slip, curve.sinkage_m) - rows.sinkage_m[inside]
-    return Misfit(
-        rows=int(inside.sum()),
-        drawbar_rms=float(np.sqrt(np.mean(drawbar**2))),
-        drawbar_mean=float(drawbar.mean()),
-        sinkage_rms_m=float(np.sqrt(np.mean(sinkage**2))),
-        sinkage_mean_m=float(sinkage.mean()),
+    name = _WHEELS.get(spec.wheel.name)
+    soil = spec.soil
+    if name is None or not isinstance(soil, MechanicalSoilSpec) or soil.name not in _SOILS:
+        return ()
+    try:
+        rows = straight(measured_wheel(name))
+    except DataError:
+        return ()
+    with np.errstate(divide="ignore"):
+        slip = 1 - rows.speed_mps / (
+            rows.rim_mps * rolling_radius(spec.wheel) / spec.wheel.radius_m
+        )
+    driving = slip >= 0
+    return (
+        WheelMeasurements(
+            label=f"measured, {name} wheel (Carnegie Mellon)",
+            slip=slip,
+            drawbar_ratio=rows.drawbar_n / rows.load_n,
+            sinkage_m=rows.sinkage_m,
+            error=prediction_error(rows, soil, spec.wheel),
+            error_driving=prediction_error(rows.only(driving), soil, spec.wheel),
+            error_skidding=prediction_error(rows.only(~driving), soil, spec.wheel),
+        ),
     )

@@ -10,10 +10,11 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from lpet_sim.rig.measured import WheelMeasurements, misfit
+from lpet_sim.recording.arrays import Array
+from lpet_sim.rig.measured import WheelMeasurements
 from lpet_sim.rig.slope import SlopeReport
 from lpet_sim.rig.slope_drive import Heading, SlopePoint
-from lpet_sim.rig.wheel import WheelCurve
+from lpet_sim.rig.wheel import WheelCurve, slip_scale
 from lpet_sim.rover.mjcf import WHEELS
 from lpet_sim.soil.load import load_soil, published_curves, soil_names
 from lpet_sim.soil.published import PublishedCurve
@@ -100,12 +101,13 @@ def wheel_tables(curve: WheelCurve, measured: Sequence[WheelMeasurements] = ()) 
         title=f"{spec.wheel.name} on {spec.soil.name}: {spec.wheel.load_n:g} N, "
         f"{spec.wheel.gravity_mps2:g} m/s2"
     )
-    headings = ("slip [%]", "drawbar / load", "traction angle [deg]", "sinkage [mm]")
+    headings = ("slip or skid [%]", "drawbar / load", "traction angle [deg]", "sinkage [mm]")
     for heading in (*headings, "torque / (load r)", f"side / load at {angle}"):
         table.add_column(Text(heading), justify="right")
-    for k in _rows_shown(curve):
+    scale = slip_scale(curve.slip)
+    for k in _rows_shown(scale):
         table.add_row(
-            f"{100 * curve.slip[k]:.1f}",
+            f"{100 * scale[k]:.1f}",
             _number(curve.drawbar_ratio[k], ".4f"),
             _number(math.degrees(curve.traction_angle_rad[k]), ".2f"),
             _number(1e3 * curve.sinkage_m[k], ".1f"),
@@ -114,29 +116,34 @@ def wheel_tables(curve: WheelCurve, measured: Sequence[WheelMeasurements] = ()) 
         )
     yield table
     if measured:
-        yield _misfit_table(curve, measured)
+        yield _error_table(measured)
 
 
-def _rows_shown(curve: WheelCurve) -> list[int]:
-    """Give the rows at whole tenths of slip, and the last."""
-    steps = curve.slip / _TABLE_STEP
+def _rows_shown(scale: Array) -> list[int]:
+    """Give the rows at whole tenths of slip or skid, and the last."""
+    steps = scale / _TABLE_STEP
     whole = np.abs(steps - np.rint(steps)) < 1e-6
     return [*np.flatnonzero(whole), *([] if whole[-1] else [len(whole) - 1])]
 
 
-def _misfit_table(curve: WheelCurve, measured: Sequence[WheelMeasurements]) -> Table:
-    table = Table(title="Against measured rows: RMS of law less measured (mean)")
-    table.add_column("rows of")
-    for heading in ("rows", "drawbar / load", "sinkage [mm]"):
+def _error_table(measured: Sequence[WheelMeasurements]) -> Table:
+    table = Table(title="Prediction against measured rows, nothing fitted to them here: RMS (mean)")
+    table.add_column("rows")
+    for heading in ("how many", "drawbar / load", "sinkage [mm]"):
         table.add_column(Text(heading), justify="right")
     for rows in measured:
-        error = misfit(curve, rows)
-        table.add_row(
-            rows.label,
-            f"{error.rows}",
-            f"{error.drawbar_rms:.4f} ({error.drawbar_mean:+.4f})",
-            f"{1e3 * error.sinkage_rms_m:.2f} ({1e3 * error.sinkage_mean_m:+.2f})",
+        parts = (
+            ("all", rows.error),
+            ("driving", rows.error_driving),
+            ("skidding", rows.error_skidding),
         )
+        for part, error in parts:
+            table.add_row(
+                f"{rows.label}: {part}",
+                f"{error.rows}",
+                f"{error.drawbar_ratio:.4f} ({error.drawbar_bias:+.4f})",
+                f"{1e3 * error.sinkage_m:.2f} ({1e3 * error.sinkage_bias_m:+.2f})",
+            )
     return table
 
 

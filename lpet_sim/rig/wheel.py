@@ -26,11 +26,30 @@ from lpet_sim.soil.slip_table import (
 )
 from lpet_sim.soil.spec import MechanicalSoilSpec, SoilSpec
 from lpet_sim.soil.tabulate import tabulate
-from lpet_sim.soil.wheel_law import wheel_forces
+from lpet_sim.soil.wheel_law import rolling_radius, wheel_forces
 from lpet_sim.spec import Spec
 
-SLIPS: Final = tuple(round(s, 3) for s in np.arange(-0.70, 0.951, 0.025).tolist())
+_SLIP_SCALE: Final = np.arange(-28, 39) / 40  # -0.70 to 0.95
 _NOMINAL: Final = LOAD_NODES // 2
+
+
+def slip_scale(slip: Array) -> Array:
+    """Give slip as it is drawn: itself, and below 0 the skid ``r omega / v - 1 = s / (1 - s)``.
+
+    So a locked wheel, whose slip ``1 - v / (r omega)`` is minus infinity, is drawn at -1.
+
+    Args:
+        slip: Slip, Shape (n,).
+    """
+    return np.where(slip < 0, 1.0 / (1.0 - np.minimum(slip, 0.0)) - 1.0, slip)
+
+
+def slip_of_scale(scale: Array) -> Array:
+    """Undo `slip_scale`; above -1, Shape (n,)."""
+    return np.where(scale < 0, 1.0 - 1.0 / (1.0 + np.minimum(scale, 0.0)), scale)
+
+
+SLIPS: Final = tuple(slip_of_scale(_SLIP_SCALE).tolist())
 
 
 class WheelRigSpec(Spec):
@@ -39,14 +58,14 @@ class WheelRigSpec(Spec):
     Attributes:
         soil: The soil.
         wheel: The wheel, with its load and the gravity of the test.
-        slip: Slips, increasing.
+        slip: Slips ``1 - v / (r omega)``, increasing.
         slip_angle_rad: Angle of the motion against the wheel's plane for the side force; the other
             quantities are those of straight rolling.
     """
 
     soil: SoilSpec
     wheel: ReferenceWheelSpec
-    slip: tuple[Annotated[float, Field(ge=-5.0, lt=1.0)], ...] = SLIPS
+    slip: tuple[Annotated[float, Field(ge=-100.0, lt=1.0)], ...] = SLIPS
     slip_angle_rad: Annotated[float, Field(ge=0.0, lt=math.radians(80.0))] = math.radians(15.0)
 
 
@@ -56,7 +75,7 @@ class WheelCurve:
 
     Attributes:
         spec: What was asked.
-        slip: ``1 - v / (r omega)``.
+        slip: ``1 - v / (r omega)``; `slip_scale` is for drawing.
         drawbar_ratio: Drawbar pull over load; nan where the soil's curve does not reach.
         torque_ratio: Torque over load and radius.
         sinkage_m: Depth of the lowest point [m].
@@ -154,7 +173,7 @@ def _by_mechanics(spec: WheelRigSpec, soil: MechanicalSoilSpec) -> WheelCurve:
         spec=spec,
         slip=slip,
         drawbar_ratio=ahead.drawbar_n / load,
-        torque_ratio=ahead.torque_nm / (load * wheel.radius_m),
+        torque_ratio=ahead.torque_nm / (load * rolling_radius(wheel)),
         sinkage_m=ahead.sinkage_m,
         side_ratio=np.abs(aslant.side_n) / load,
     )

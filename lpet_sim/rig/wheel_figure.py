@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lpet_sim.recording.arrays import Array
-from lpet_sim.rig.measured import WheelMeasurements, misfit
-from lpet_sim.rig.wheel import WheelCurve
+from lpet_sim.rig.measured import WheelMeasurements
+from lpet_sim.rig.wheel import WheelCurve, slip_scale
+from lpet_sim.soil.measured_wheels import PredictionError
 
 _COLOUR: Final = "#D55E00"
 _SIDE_COLOUR: Final = "#0072B2"
@@ -20,7 +21,7 @@ _EVERY: Final = 4  # points from one marker of the curve to the next
 
 
 def plot_wheel(curve: WheelCurve, measured: Sequence[WheelMeasurements] = ()) -> Figure:
-    """Draw a wheel rig; the band about the drawbar pull and sinkage is the RMS misfit, if any.
+    """Draw a wheel rig; a band is the RMS difference from the measured rows.
 
     Args:
         curve: The curve.
@@ -31,41 +32,48 @@ def plot_wheel(curve: WheelCurve, measured: Sequence[WheelMeasurements] = ()) ->
     """
     figure = Figure(figsize=(8.0, 10.0), layout="constrained")
     pull, angle, sinkage, torque = figure.subplots(4, 1, sharex=True, height_ratios=(3, 2, 2, 2))
-    errors = [misfit(curve, rows) for rows in measured]
-    _draw(pull, curve, curve.drawbar_ratio, max((e.drawbar_rms for e in errors), default=0.0))
+    _draw(pull, curve, curve.drawbar_ratio)
     _draw(angle, curve, np.degrees(curve.traction_angle_rad))
-    depth_error = max((1e3 * e.sinkage_rms_m for e in errors), default=0.0)
-    _draw(sinkage, curve, 1e3 * curve.sinkage_m, depth_error)
+    _draw(sinkage, curve, 1e3 * curve.sinkage_m)
     _draw(torque, curve, curve.torque_ratio, label="torque / (load r)")
     side = f"side force / load at {np.degrees(curve.spec.slip_angle_rad):.0f} deg"
     _draw(torque, curve, curve.side_ratio, colour=_SIDE_COLOUR, label=side)
     for k, rows in enumerate(measured):
         style = {"marker": _MARKERS[k % len(_MARKERS)], "ls": "", "color": "black", "mfc": "none"}
-        pull.plot(100 * rows.slip, rows.drawbar_ratio, label=rows.label, ms=5, **style)
-        angle.plot(100 * rows.slip, np.degrees(np.arctan(rows.drawbar_ratio)), ms=4, **style)
-        sinkage.plot(100 * rows.slip, 1e3 * rows.sinkage_m, ms=4, **style)
+        slip = 100 * slip_scale(rows.slip)
+        _band(pull, curve, curve.drawbar_ratio, rows, lambda error: error.drawbar_ratio)
+        _band(sinkage, curve, 1e3 * curve.sinkage_m, rows, lambda error: 1e3 * error.sinkage_m)
+        pull.plot(slip, rows.drawbar_ratio, label=rows.label, ms=5, **style)
+        angle.plot(slip, np.degrees(np.arctan(rows.drawbar_ratio)), ms=5, **style)
+        sinkage.plot(slip, 1e3 * rows.sinkage_m, ms=5, **style)
     pull.set_ylabel("drawbar pull / load")
     angle.set_ylabel("traction angle\n[deg]")
     sinkage.set_ylabel("sinkage [mm]")
     torque.set_ylabel("ratio")
-    torque.set_xlabel("slip [%]")
+    torque.set_xlabel("slip 1 - v / (r ω), and below 0 skid r ω / v - 1 [%]")
     _finish(figure, curve, (pull, angle, sinkage, torque))
     return figure
 
 
 def _draw(
+    axes: Axes, curve: WheelCurve, y: Array, colour: str = _COLOUR, label: str = "law"
+) -> None:
+    slip = 100 * slip_scale(curve.slip)
+    axes.plot(slip, y, "o-", color=colour, lw=1.5, ms=4, markevery=_EVERY, label=label)
+
+
+def _band(
     axes: Axes,
     curve: WheelCurve,
     y: Array,
-    band: float = 0.0,
-    colour: str = _COLOUR,
-    label: str = "law",
+    rows: WheelMeasurements,
+    size: Callable[[PredictionError], float],
 ) -> None:
-    slip = 100 * curve.slip
-    axes.plot(slip, y, "o-", color=colour, lw=1.5, ms=4, markevery=_EVERY, label=label)
-    if band > 0:
-        text = f"law, RMS misfit {band:.2g}"
-        axes.fill_between(slip, y - band, y + band, color=colour, alpha=0.18, lw=0, label=text)
+    """Shade the RMS difference from the measured rows, of the skidding and the driving part."""
+    slip = 100 * slip_scale(curve.slip)
+    half = np.where(slip < 0, size(rows.error_skidding), size(rows.error_driving))
+    label = f"RMS difference: {half[-1]:.2g} driving, {half[0]:.2g} skidding"
+    axes.fill_between(slip, y - half, y + half, color=_COLOUR, alpha=0.18, lw=0, label=label)
 
 
 def _finish(figure: Figure, curve: WheelCurve, rows: Sequence[Axes]) -> None:
