@@ -75,6 +75,11 @@ class SlopePoint:
     wheel_sinkage_m: tuple[float, ...]
 
     @property
+    def held(self) -> bool:
+        """Whether the drive came to a steady motion, be it backwards."""
+        return self.ended in ("steady", "slides back")
+
+    @property
     def sinkage_m(self) -> float:
         """Mean sinkage of the wheels [m]."""
         return float(np.mean(self.wheel_sinkage_m))

@@ -25,7 +25,7 @@ _ARROW_PERCENT: Final = 4.0  # length of the arrow down from an upper bound
 def plot_slope(report: SlopeReport, published: Sequence[PublishedCurve] = ()) -> Figure:
     """Draw a slope rig: slip for each heading above, drift across and sinkage below.
 
-    A run that slid or stalled has an open marker; the band is one standard deviation over time.
+    The band is one standard deviation over time, of the runs that were steady.
 
     Args:
         report: What was measured.
@@ -46,9 +46,11 @@ def plot_slope(report: SlopeReport, published: Sequence[PublishedCurve] = ()) ->
     rows[1].set_ylabel("downhill drift\nacross [deg]")
     _draw(rows[2], report, report.spec.headings, lambda p: 1e3 * p.sinkage_m)
     rows[2].set_ylabel("sinkage [mm]")
+    rows[2].set_ylim(0.0, max(rows[2].get_ylim()[1], 1.0))
     rows[2].set_xlabel("slope of the bed [deg]")
     for row in rows:
         row.grid(alpha=0.3)
+    rows[0].plot([], [], "o", color="gray", mfc="white", label="not steady: slides, stalls, tips")
     rows[0].legend(loc="upper left", fontsize="small")
     figure.suptitle(_title(report), fontsize="medium")
     return figure
@@ -75,17 +77,18 @@ def _draw(
         colour, marker = COLOURS[heading], _MARKERS[heading]
         slope = np.array([np.degrees(point.slope_rad) for point in points])
         y = np.array([value(point) for point in points])
+        held = np.array([point.held for point in points])
         axes.plot(slope, y, color=colour, lw=1.5, label=f"simulated, {heading}")
         if band is not None:
-            half = np.array([band(point) for point in points])
+            half = np.where(held, [band(point) for point in points], 0.0)
             axes.fill_between(slope, y - half, y + half, color=colour, alpha=0.2, lw=0)
-        held = np.array([point.ended in ("steady", "slides back") for point in points])
         axes.plot(slope[held], y[held], marker, color=colour, ms=5)
         axes.plot(slope[~held], y[~held], marker, color=colour, ms=6, mfc="white")
 
 
 def _draw_published(axes: Axes, published: Sequence[PublishedCurve]) -> None:
-    for k, curve in enumerate(published):
+    longest_first = sorted(published, key=lambda curve: -len(curve.slip))
+    for k, curve in enumerate(longest_first):
         slope = np.degrees(curve.slope_rad)
         slip = 100 * np.array(curve.slip)
         error = 100 * np.array(curve.slip_tolerance or (0.0,) * len(slope))

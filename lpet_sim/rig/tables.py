@@ -76,14 +76,14 @@ def _published_slip(point: SlopePoint, curve: PublishedCurve) -> str:
 
 def _wheels_table(report: SlopeReport) -> Table:
     """Make the table of the single wheels: slip, traction over load and load of each."""
-    table = Table(title="Wheel by wheel: slip [%] at traction over load, load [N]")
+    table = Table(title="Wheel by wheel: slip [%], traction over load, load [N]")
     table.add_column("heading")
     table.add_column(Text("slope [deg]"), justify="right")
     for wheel in WHEELS:
         table.add_column(wheel.replace("_", " "), justify="right")
     for point in report.points:
         wheels = zip(point.wheel_slip, point.wheel_traction, point.wheel_load_n, strict=True)
-        cells = (f"{100 * s:.1f} at {x:+.3f}, {n:.0f}" for s, x, n in wheels)
+        cells = (f"{100 * s:.1f} {x:+.3f} {n:.0f}" for s, x, n in wheels)
         table.add_row(point.heading, f"{math.degrees(point.slope_rad):.2f}", *cells)
     return table
 

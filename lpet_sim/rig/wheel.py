@@ -29,7 +29,7 @@ from lpet_sim.soil.tabulate import tabulate
 from lpet_sim.soil.wheel_law import rolling_radius, wheel_forces
 from lpet_sim.spec import Spec
 
-_SLIP_SCALE: Final = np.arange(-28, 39) / 40  # -0.70 to 0.95
+_SLIP_SCALE: Final = np.arange(-38, 39) / 40  # -0.95 to 0.95
 _NOMINAL: Final = LOAD_NODES // 2
 
 
