@@ -27,6 +27,8 @@ _RANGES = {
     "traction_over_load": rrb.ScalarAxis(range=(-1.0, 1.0)),
 }
 
+_WITHOUT_KEY = ("slip", "slip_angle_deg")
+
 Part = rrb.Container | rrb.View
 Vector = tuple[float, float, float]
 
@@ -50,7 +52,7 @@ def _left(overview: Overview) -> rrb.Container:
     ):
         if parts:
             rows.append(rrb.Horizontal(*parts))
-    return rrb.Vertical(*rows, row_shares=[6, 2, 2][: len(rows)])
+    return rrb.Vertical(*rows, row_shares=[5, 2, 3][: len(rows)])
 
 
 def _right(overview: Overview) -> rrb.Container:
@@ -157,7 +159,9 @@ def _wheel_view(quantity: str, overview: Overview) -> list[Part]:
         entities.append(layout.SEEN_SLIP)
         title = f"{title}, and as vision sees it (white)" if overview.has_wheel_truth else "Slip"
     # A wheel that hardly turns has a slip of any size; what matters lies between these.
-    return _curves(title, entities, overview, _RANGES.get(quantity))
+    # The legend would cover the curves; the views beside have it in the same colours.
+    key = quantity not in _WITHOUT_KEY
+    return _curves(title, entities, overview, _RANGES.get(quantity), key)
 
 
 def _counts(overview: Overview) -> list[Part]:
@@ -171,7 +175,11 @@ def _counts(overview: Overview) -> list[Part]:
 
 
 def _curves(
-    name: str, entities: list[str], overview: Overview, axis_y: rrb.ScalarAxis | None = None
+    name: str,
+    entities: list[str],
+    overview: Overview,
+    axis_y: rrb.ScalarAxis | None = None,
+    key: bool = True,
 ) -> list[Part]:
     """Plot curves over the whole traverse."""
     if not entities:
@@ -184,7 +192,7 @@ def _curves(
         origin="/",
         contents=entities,
         name=name,
-        plot_legend=rrb.PlotLegend("LeftTop"),
+        plot_legend=rrb.PlotLegend("LeftTop", visible=key),
         axis_x=rrb.TimeAxis(view_range=whole),
         axis_y=axis_y,
     )

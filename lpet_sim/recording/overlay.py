@@ -221,8 +221,8 @@ def _draw_errors(pen: Pen, facts: EstimateFacts, errors: ErrorsOverTime) -> None
 
 
 def _draw_slip(copy: _Copy, slip: SlipOverTime) -> None:
-    known = np.isfinite(slip.slip)
-    if known.any():
-        copy.pen.curve(layout.SEEN_SLIP, slip.t_ns[known], slip.slip[known])
+    """Draw the slip that vision sees; where it sees none, NaN, the curve has a gap."""
+    if len(slip.t_ns):
+        copy.pen.curve(layout.SEEN_SLIP, slip.t_ns, slip.slip)
         copy.pen.curve_style(layout.SEEN_SLIP, ["seen by vision"], [TRUTH_COLOUR], 2.5)
         copy.overview = replace(copy.overview, has_seen_slip=True)

@@ -14,7 +14,8 @@ from lpet_sim.recording.visuals import Pen
 
 CURVE_PERIOD_NS = NS_PER_S
 _PERIODS_AT_ONCE = 512
-_LEAST_LOAD_N = 1.0
+# A wheel that turns or carries less in the mean of a period has no slip and no ratio to show.
+_LEAST_TURN_RAD, _LEAST_LOAD_N = 0.03, 1.0
 
 TITLES = {
     "slip": "Wheel slip, true",
@@ -49,13 +50,13 @@ class _Sums:
         return cls(wheels.t_ns, np.stack(columns, axis=1))
 
     def curves(self) -> dict[str, Array]:
-        """Give the mean of each quantity, Shape (n, w) each."""
+        """Give the mean of each quantity, Shape (n, w) each; NaN is a gap in the curve."""
         turn, slip, angle, count, sinkage, load, traction = np.moveaxis(self.values, 1, 0)
         return {
-            "slip": _ratio(slip, turn, 0.0),
-            "slip_angle_deg": np.degrees(_ratio(angle, turn, 0.0)),
-            "sinkage_mm": 1000.0 * _ratio(sinkage, count, 0.0),
-            "load_n": _ratio(load, count, 0.0),
+            "slip": _ratio(slip, turn, _LEAST_TURN_RAD),
+            "slip_angle_deg": np.degrees(_ratio(angle, turn, _LEAST_TURN_RAD)),
+            "sinkage_mm": 1000.0 * sinkage / count,
+            "load_n": load / count,
             "traction_over_load": _ratio(traction, load, _LEAST_LOAD_N * count),
         }
 
@@ -64,8 +65,8 @@ class WheelCurves:
     """Draws the mean of each second of the wheels' truth, over any number of pieces.
 
     Slip is ``1 - v / (r omega)``, of any size where a wheel barely turns. Its mean over a second is
-    weighted by the turn, ``sum s |d_angle| / sum |d_angle|``: the slip of the whole second. The
-    exact stream is stored beside it.
+    weighted by the turn, ``sum s |d_angle| / sum |d_angle|``: the slip of the whole second; a wheel
+    that turns by less than 0.03 rad meanwhile leaves a gap. The exact stream is stored beside it.
     """
 
     def __init__(self, pen: Pen, names: Sequence[str]) -> None:
@@ -74,7 +75,7 @@ class WheelCurves:
         self._angle: Array | None = None
         self._pending: list[_Sums] = []
         for quantity in TITLES:
-            pen.wheel_curve_style(layout.wheel_curve(quantity), names)
+            pen.wheel_curve_style(layout.wheel_curve(quantity), [_short(name) for name in names])
 
     def add(self, wheels: WheelTruth) -> None:
         """Add a piece, and draw when there is enough of it."""
@@ -110,6 +111,12 @@ class WheelCurves:
 
 
 def _ratio(above: Array, below: Array, least: Array | float) -> Array:
-    """Divide where the divisor is more than the least, and give 0 elsewhere."""
+    """Divide where the divisor is more than the least, and give NaN elsewhere."""
     fits = below > least
-    return np.where(fits, above / np.where(fits, below, 1.0), 0.0)
+    return np.where(fits, above / np.where(fits, below, 1.0), np.nan)
+
+
+def _short(name: str) -> str:
+    """Shorten ``front_left`` to ``FL``, for a legend beside six curves."""
+    parts = name.split("_")
+    return "".join(part[0] for part in parts).upper() if len(parts) > 1 else name

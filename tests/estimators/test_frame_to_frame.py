@@ -114,6 +114,18 @@ def test_the_covariance_of_a_step_is_consistent_for_the_noise_there_is(
     assert (BAND_100_RUNS[0] < np.mean(nees) < BAND_100_RUNS[1]) == consistent
 
 
+def test_the_declared_error_of_a_step_is_that_of_its_worst_direction() -> None:
+    """Along the view, where stereo sees least, steps scatter by as much as is declared."""
+    run, world = estimate(0), scene().T_world_body
+    poses = run.trajectory.T_world_body
+    seen, true = (T[:-1].inverse() @ T[1:] for T in (poses, world))
+    error = (seen.inverse() @ true).translation
+    worst = np.linalg.eigvalsh(error.T @ error / len(error))[-1]
+    declared = run.diagnostics["step_sigma_m"]
+    assert declared[0] == 0.0 and np.all(declared[1:] > 0.0)
+    assert np.sqrt(worst / np.mean(declared[1:] ** 2)) == pytest.approx(1.0, abs=0.15)
+
+
 def test_a_third_of_false_sightings_costs_little() -> None:
     """With 20 % outliers in each image, 36 % of the pairs are false, and no step fails."""
     rows = sightings(1)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lpet_sim.recording import layout
 from lpet_sim.recording.estimate import Estimate
-from lpet_sim.recording.overlay import add_estimate, add_sightings
+from lpet_sim.recording.overlay import add_estimate, add_estimates, add_sightings
 from lpet_sim.recording.overview import Overview
 from lpet_sim.recording.reader import open_store, read_estimates, read_recording
 from lpet_sim.recording.recording import Recording
@@ -148,3 +148,27 @@ def test_the_summary_tells_the_end_error(path: Path) -> None:
     assert facts.end_error_m == pytest.approx(0.01 * (len(errors.t_ns) - 1))
     assert facts.attitude_deg[1] == pytest.approx(np.degrees(1e-3 * (len(errors.t_ns) - 1)))
     assert facts.label == "a: 0.12 m, 0.50 %"
+
+
+@dataclass(frozen=True)
+class Slip:
+    """Slip as evaluation gives it."""
+
+    t_ns: NDArray[np.int64]
+    slip: NDArray[np.float64]
+
+
+def test_slip_seen_by_vision_is_drawn_with_its_gaps_and_stays(path: Path) -> None:
+    """A later overlay without slip leaves the curve; one with slip replaces it."""
+    t_ns = np.arange(1, 6) * 10**9
+    for level in (0.9, 0.1):
+        slip = Slip(t_ns, np.array([0.1, level, np.nan, 0.2, 0.3]))
+        add_estimates(path, [(synthetic.estimate("a", DURATION_S), None)], slip=slip)
+    add_estimate(path, synthetic.estimate("b", DURATION_S))
+    store = open_store(path)
+    batches = [chunk.to_record_batch() for chunk in store.chunks(layout.SEEN_SLIP)]
+    name = "Scalars:scalars"
+    rows = [b.column(name).to_pylist() for b in batches if name in b.schema.names]
+    drawn = [value for batch in rows for row in batch for value in row]
+    np.testing.assert_array_equal(drawn, [0.1, 0.1, np.nan, 0.2, 0.3])
+    assert Overview.from_json(store.json(layout.SUMMARY)).has_seen_slip
