@@ -24,12 +24,14 @@ from rich.progress import track
 
 from estimators import build_estimator
 from lpet_sim.evaluation import RunResult, evaluate
+from lpet_sim.evaluation.attribution import CAUSES
+from lpet_sim.evaluation.slip_match import SlipMatch
 from lpet_sim.outputs import output_folder, whole_file
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.sensors.camera_spec import DeclaredErrorSpec
 from lpet_sim.study import SCENARIOS
 from lpet_sim.sweep.miscalibration import miscalibrate
-from lpet_sim.sweep.score import attribute_dead_reckoning, estimate_recording, score_recording
+from lpet_sim.sweep.score import estimate_recording, score_recording
 from lpet_sim.sweep.simulate import simulate
 from lpet_sim.sweep.traverse import TraverseSpec
 from scenarios import first_traverse
@@ -83,11 +85,25 @@ def _score(run: Path, seed: int) -> list[Row]:
     measurements = miscalibrate(read_recording(run).measurements, WRONG)
     estimate = build_estimator("frame_to_frame").estimate(measurements)
     rows.append(_row(seed, "wrong calibration", evaluate(estimate, score.truth)))
-    split = attribute_dead_reckoning(score.recording)
-    if split is not None:
-        causes = {f"{name}_m": math.hypot(*v) for name, v in split.contributions_m.items()}
-        rows[[row["estimator"] for row in rows].index("dead_reckoning")].update(causes)
+    reckoned = rows[[row["estimator"] for row in rows].index("dead_reckoning")]
+    if score.attribution is not None:
+        causes = score.attribution.contributions_m
+        reckoned.update({f"{name}_m": math.hypot(*vector) for name, vector in causes.items()})
+    reckoned.update(_slip_row(score.slips or ()))
     return rows
+
+
+def _slip_row(slips: tuple[SlipMatch, ...]) -> Row:
+    """Sum up what comparing vision with the wheels found of the forced slip."""
+    forced = [match for match in slips if match.event is not None]
+    row: Row = {"found_unforced": sum(match.event is None for match in slips)}
+    if forced:
+        row["found_in_time"] = int(forced[0].within_one_image)
+        row["lost_true_m"] = forced[0].lost_true_m
+        if forced[0].found is not None:
+            row["found_late_s"] = forced[0].late_s
+            row["found_lost_m"] = forced[0].found.lost_m
+    return row
 
 
 def _row(seed: int, arm: str, result: RunResult) -> Row:
@@ -142,9 +158,23 @@ def _summary(rows: list[Row]) -> list[str]:
         lines.append(f"| {arm} | {name} | {cells} |")
     reckoned = [row for row in rows if "slip_m" in row]
     lines += ["", "Dead reckoning's end error by cause [m]:", "", "| cause | length |", "|---|---|"]
-    for cause in ("slip_m", "forced_slip_m", "scale_m", "model_m"):
-        lines.append(f"| {cause[:-2]} | {_spread([row[cause] for row in reckoned])} |")
-    return lines
+    for cause in CAUSES:
+        lines.append(f"| {cause} | {_spread([row[f'{cause}_m'] for row in reckoned])} |")
+    return [*lines, *_slip_summary(reckoned)]
+
+
+def _slip_summary(rows: list[Row]) -> list[str]:
+    forced = [row for row in rows if "found_in_time" in row]
+    found = [row for row in forced if "found_late_s" in row]
+    lines = ["", "Slip found by comparing frame-to-frame vision with the wheels:", ""]
+    in_time = sum(row["found_in_time"] for row in forced)
+    lines.append(f"- forced slip found within one image: {in_time} of {len(forced)} seeds")
+    if found:
+        lines.append(f"- onset late by [s]: {_spread([row['found_late_s'] for row in found])}")
+        lines.append(f"- lost, found [m]: {_spread([row['found_lost_m'] for row in found])}")
+        lines.append(f"- lost, true [m]: {_spread([row['lost_true_m'] for row in found])}")
+    unforced = [row["found_unforced"] for row in rows if "found_unforced" in row]
+    return [*lines, f"- other slips found: {sum(unforced)} in {len(unforced)} seeds"]
 
 
 def _spread(values: list[float]) -> str:
