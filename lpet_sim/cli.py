@@ -51,13 +51,15 @@ def simulate(
     out: Annotated[Path, typer.Option(help="The recording to write.")] = Path("run.rrd"),
 ) -> None:
     """Drive a traverse in simulation and record it."""
+    from lpet_sim.evaluation.tables import event_table
     from lpet_sim.sweep.simulate import simulate as run
     from lpet_sim.sweep.traverse import TraverseSpec
 
     traverse = TraverseSpec.from_yaml(spec)
     with bar(f"driving {traverse.name}") as progress:
-        run(traverse, seed, out, progress)
-    wrote(out)
+        result = run(traverse, seed, out, progress)
+    print_tables([event_table(result.events)])
+    wrote(result.path)
 
 
 @app.command()

@@ -37,7 +37,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Record the traverse of 30 cm; not to be changed."""
     folder = tmp_path_factory.mktemp("recorded")
     (folder / "tiny.yaml").write_text(TINY)
-    return simulate(TraverseSpec.from_yaml(folder / "tiny.yaml"), 1, folder / "run.rrd")
+    return simulate(TraverseSpec.from_yaml(folder / "tiny.yaml"), 1, folder / "run.rrd").path
 
 
 @pytest.fixture
@@ -216,7 +216,10 @@ def test_the_chain_of_commands_ends_in_a_verdict(lpet: Lpet, spec: Path, tmp_pat
     limits = "{position_ratio: 10, roll_rad: 3, pitch_rad: 3, yaw_rad: 3, completion: 0}"
     lax.write_text(limits)
     strict.write_text(limits.replace("position_ratio: 10", "position_ratio: 1.0e-9"))
-    assert lpet("simulate", spec, "--seed", "5", "--out", run) == Ended(0, f"wrote {run}\n", "")
+    ended = lpet("simulate", spec, "--seed", "5", "--out", run)
+    assert (ended.code, ended.err) == (0, "")
+    assert "The drive, ended by goal" in ended.out
+    assert ended.out.endswith(f"wrote {run}\n")
     assert read_recording(run).manifest.seed == 5
     ended = lpet("estimate", run)
     assert (ended.code, ended.err) == (0, "")

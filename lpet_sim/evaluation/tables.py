@@ -14,6 +14,7 @@ from lpet_sim.evaluation.requirement import Requirement, Verdict, VerdictLine
 from lpet_sim.evaluation.result import RunResult
 from lpet_sim.evaluation.slip_match import SlipMatch
 from lpet_sim.recording.arrays import NS_PER_S
+from lpet_sim.recording.truth import Event
 
 _CAUSES = (
     "scale: encoders' scale and noise, track width; slip: along the wheels; side_slip: across "
@@ -23,6 +24,8 @@ _FOUND = (
     "From dead reckoning and frame-to-frame vision alone. In time: onset within one image interval "
     "of the true one. A slip that nothing forced is the ground's own."
 )
+
+_ROUTINE = frozenset({"start", "stop", "point_turn"})
 
 
 def result_table(
@@ -120,6 +123,23 @@ def _slip_cells(match: SlipMatch) -> tuple[Text | str, ...]:
         in_time,
         f"{lost} ({match.lost_true_m:.3f})",
     )
+
+
+def event_table(events: Sequence[Event]) -> Table:
+    """Make a table of what happened on a drive, stops and turns left out, and how it ended."""
+    ending = next((event for event in events if event.ends), None)
+    ended = f", ended by {ending.kind}" if ending is not None else ""
+    table = Table(title=Text(f"The drive{ended}"))
+    for heading in ("from [s]", "for [s]"):
+        table.add_column(Text(heading), justify="right")
+    table.add_column("event")
+    table.add_column("what happened")
+    for event in events:
+        if event.kind not in _ROUTINE:
+            lasted = f"{event.duration_s:.1f}" if event.duration_s else ""
+            row = (f"{event.t_ns / NS_PER_S:.1f}", lasted, Text(event.kind), Text(event.text))
+            table.add_row(*row, style="bold" if event.ends else None)
+    return table
 
 
 def pass_or_fail(passed: bool) -> Text:

@@ -46,21 +46,21 @@ def drive(scene: Scene, spec: DriveSpec, chunk_s: float = 10.0) -> Iterator[Trut
     """Drive from the first waypoint to the last.
 
     The rover settles first; time 0 is after that. Every time is a whole number of physics steps.
-    Exactly one event ends the drive (`Event.ends`): ``goal``, ``time_limit``, ``off_ground``, or
-    a failure of the kinds that ``spec.failures`` names; failures of other kinds are recorded and it
-    goes on. What lasts (faults and failures) is one event each time, in the chunk in which it is
-    over, with the time at which it began.
+    Exactly one event ends the drive (`Event.ends`): ``goal``, ``time_limit``, ``off_ground``,
+    ``unstable`` (the physics), or a failure of a kind that ``spec.failures`` names. Failures of
+    other kinds are recorded, and it goes on. What lasts (faults and failures) is one event each
+    time, in the chunk in which it is over, with the time at which it began.
 
     Args:
         scene: A rover that stands at the first waypoint, from `build_scene`.
         spec: The drive.
-        chunk_s: Length of the chunks, rounded to whole intervals of the control [s].
+        chunk_s: Length of the chunks, rounded to whole samples of the body [s].
 
     Yields:
         The truth, piece by piece: each piece continues the last, and the first begins at time 0.
 
     Raises:
-        SpecError: A rate does not divide the physics rate, or the body's is below the control's.
+        SpecError: A rate does not divide the physics rate.
         PlanningError: The path leaves the drivable ground, or the rover is not at its start.
     """
     ticks = _ticks(spec, scene.spec.physics_dt_s, chunk_s)
@@ -71,15 +71,10 @@ def drive(scene: Scene, spec: DriveSpec, chunk_s: float = 10.0) -> Iterator[Trut
 
 def _ticks(spec: DriveSpec, dt_s: float, chunk_s: float) -> _Ticks:
     body = _steps_per(spec.imu_rate_hz, dt_s, "imu_rate_hz")
+    wheels = _steps_per(spec.wheel_rate_hz, dt_s, "wheel_rate_hz")
     control = _steps_per(spec.control_rate_hz, dt_s, "control_rate_hz")
-    if body > control:
-        raise SpecError(
-            f"imu_rate_hz {spec.imu_rate_hz:g} must be at least control_rate_hz "
-            f"{spec.control_rate_hz:g}, so that the body is sampled between two commands"
-        )
-    # A drive ends at a command. Chunks end there too, so that the last one is never without rows.
-    chunk = control * max(1, round(chunk_s / dt_s / control))
-    return _Ticks(body, _steps_per(spec.wheel_rate_hz, dt_s, "wheel_rate_hz"), control, chunk)
+    chunk = body * max(1, round(chunk_s / dt_s / body))
+    return _Ticks(body, wheels, control, chunk)
 
 
 def _steps_per(rate_hz: float, dt_s: float, name: str) -> int:
@@ -122,20 +117,33 @@ class _Drive:
         return self._step * self._dt_ns / NS_PER_S
 
     def chunks(self) -> Iterator[Truth]:
-        """Settle, then step until the drive ends."""
+        """Settle, then step until the drive ends; every chunk begins with a row of the body."""
         self._settle()
         self._note("start", 0.0, f"sets out on {self._follower.length_m:.1f} m")
-        self._sample()
-        while not self._ended:
+        while True:
+            if self._step and self._step % self._ticks.chunk == 0:
+                yield self._take()
+            self._sample()
             if self._step % self._ticks.control == 0:
                 self._control()
-            if self._ended or (self._step and self._step % self._ticks.chunk == 0):
-                self._log.events = list(in_order(self._log.events))
-                yield self._log.take()
             if not self._ended:
-                self._scene.step()
-                self._step += 1
-                self._sample()
+                self._advance()
+            if self._ended:
+                yield self._take()
+                return
+
+    def _advance(self) -> None:
+        """Step; where MuJoCo gave up and reset its state, which turns back its clock, end."""
+        before_s = self._scene.data.time
+        self._scene.step()
+        if self._scene.data.time <= before_s:
+            self._end("unstable", f"the physics became unstable {self._place}")
+        else:
+            self._step += 1
+
+    def _take(self) -> Truth:
+        self._log.events = list(in_order(self._log.events))
+        return self._log.take()
 
     def _settle(self) -> None:
         self._scene.command(np.zeros(6), np.zeros(6))

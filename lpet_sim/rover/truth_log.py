@@ -39,11 +39,6 @@ class TruthLog:
         self._wheel_t_ns.append(t_ns)
         self._wheels.append(row)
 
-    @property
-    def empty(self) -> bool:
-        """Whether there is no row of the body."""
-        return not self._body
-
     def take(self) -> Truth:
         """Give everything since the last chunk, and forget it."""
         truth = Truth(self._take_body(), self._take_wheels(), tuple(self.events))

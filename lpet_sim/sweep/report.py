@@ -11,6 +11,7 @@ from rich.text import Text
 from lpet_sim.evaluation import Requirement
 from lpet_sim.evaluation.tables import (
     attribution_table,
+    event_table,
     result_table,
     segment_table,
     slip_table,
@@ -21,12 +22,14 @@ from lpet_sim.terrain.summary import TerrainSummary
 
 
 def score_tables(score: Score, requirement: Requirement) -> Iterator[Table]:
-    """Make the tables of a score: errors, verdict by line, segment drift, error by cause, slips.
+    """Make the tables of a score: the drive's events, errors, verdict, drift, causes, slips.
 
     Args:
         score: The score.
         requirement: What the results are held to.
     """
+    if score.truth.events:
+        yield event_table(score.truth.events)
     source = score.recording.manifest
     seed = "" if source.seed is None else f", seed {source.seed}"
     yield result_table(score.results, requirement, f"{source.source}{seed}")

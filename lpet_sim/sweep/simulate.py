@@ -13,7 +13,7 @@ import numpy as np
 from lpet_sim.outputs import output_folder
 from lpet_sim.progress import Progress, silent
 from lpet_sim.recording.calibration import Calibration
-from lpet_sim.recording.truth import Truth
+from lpet_sim.recording.truth import Event, Truth, in_order
 from lpet_sim.recording.writer import RecordingWriter
 from lpet_sim.rng import stream
 from lpet_sim.rover.drive import drive, start_of
@@ -54,6 +54,19 @@ class World:
         return self.scene.frames
 
 
+@dataclass(frozen=True)
+class SimulateResult:
+    """A traverse that was driven and recorded.
+
+    Attributes:
+        path: The recording.
+        events: What happened on the drive, in order of time; the one that `ends` says how.
+    """
+
+    path: Path
+    events: tuple[Event, ...]
+
+
 def build_world(spec: TraverseSpec, seed: int) -> World:
     """Build ground, path and rover.
 
@@ -73,8 +86,12 @@ def build_world(spec: TraverseSpec, seed: int) -> World:
     return World(spec, seed, terrain, path, build_scene(terrain, spec.rover, start, heading_rad))
 
 
-def simulate(spec: TraverseSpec, seed: int, path: Path, progress: Progress = silent) -> Path:
+def simulate(
+    spec: TraverseSpec, seed: int, path: Path, progress: Progress = silent
+) -> SimulateResult:
     """Drive a traverse and record it.
+
+    A drive that fails on the way (tips, sinks in, hangs up, gets stuck) is a result like any other.
 
     Args:
         spec: The traverse.
@@ -83,7 +100,7 @@ def simulate(spec: TraverseSpec, seed: int, path: Path, progress: Progress = sil
         progress: Called with the fraction of the path driven.
 
     Returns:
-        The recording's path.
+        The recording, and what happened on the drive.
 
     Raises:
         LpetError: The spec cannot be driven, or the file cannot be written.
@@ -98,13 +115,15 @@ def simulate(spec: TraverseSpec, seed: int, path: Path, progress: Progress = sil
     with RecordingWriter(path, manifest, calibration, keep) as writer, ExitStack() as stack:
         sensing = _Sensing(world, calibration, writer, stack)
         driven_m, length_m = 0.0, _length_m(world.drive)
+        events: list[Event] = []
         for piece in chain([first], pieces):
             sensing.sense(piece)
+            events += piece.events
             driven_m += _moved_m(piece)
             progress(min(1.0, driven_m / length_m))
         sensing.finish()
         draw_ground(writer, world.terrain, np.asarray(world.drive.waypoints_m))
-    return path
+    return SimulateResult(path, in_order(events))
 
 
 def _calibration(world: World, first: Truth) -> Calibration:

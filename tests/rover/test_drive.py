@@ -179,6 +179,25 @@ def test_a_drive_that_takes_too_long_is_ended(caplog: pytest.LogCaptureFixture) 
     assert driven.body("t_ns")[-1] == 3_000_000_000
 
 
+@pytest.mark.parametrize(("chunk_s", "rates"), [(1.0, (100.0, 10.0)), (0.5, (4.0, 10.0))])
+def test_an_end_on_the_edge_of_a_chunk_is_not_lost(
+    chunk_s: float, rates: tuple[float, float], caplog: pytest.LogCaptureFixture
+) -> None:
+    """The event is there, no chunk is without rows, also where the body is sampled less often."""
+    spec = DriveSpec(
+        waypoints_m=((0.0, 0.0), (5.0, 0.0)),
+        time_limit_s=3.0,
+        settle_s=1.0,
+        imu_rate_hz=rates[0],
+        control_rate_hz=rates[1],
+    )
+    with caplog.at_level(logging.CRITICAL):
+        driven = _drive(Waves(amplitude_m=0.01), spec, chunk_s)
+    assert driven.events["time_limit"] == 3.0
+    assert all(len(chunk.body) for chunk in driven.chunks)
+    np.testing.assert_allclose(np.diff(driven.body("t_ns")), 1e9 / rates[0])
+
+
 def test_bad_drives_are_refused_before_they_begin() -> None:
     """A rate that does not divide the clock, a path off the map, a rover elsewhere, bad specs."""
     scene = build_scene(Waves(drivable=Box(-5, -5, 5, 5)), RoverSpec())

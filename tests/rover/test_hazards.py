@@ -3,6 +3,7 @@
 import logging
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -148,6 +149,25 @@ def test_ground_that_cannot_be_laid_ends_the_drive_too() -> None:
     outcome = drive_over(ground, rover=RoverSpec(patch_m=4.0))
     assert outcome.ending.kind == "off_ground"
     assert "a rover's patch may rise by less than 16 m" in outcome.ending.text
+
+
+def test_physics_that_breaks_down_ends_the_drive(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """MuJoCo then resets its state without a word to the caller: no such row is in the truth."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it runs
+    refresh = Scene.refresh_soil
+
+    def refresh_and_break(scene: Scene) -> None:
+        refresh(scene)
+        if scene.xy[0] > 0.5:
+            scene.data.qvel[3] = 1e12
+
+    monkeypatch.setattr(Scene, "refresh_soil", refresh_and_break)
+    outcome = drive_over(Waves(amplitude_m=0.01))
+    assert outcome.ending.kind == "unstable"
+    assert outcome.position[-1, 0] == pytest.approx(0.5, abs=0.02)
+    assert outcome.ending.t_ns / NS_PER_S == pytest.approx(outcome.t_s[-1], abs=0.1)
 
 
 def _sinking(monkeypatch: pytest.MonkeyPatch, begin_m: float, length_m: float) -> None:

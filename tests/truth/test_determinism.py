@@ -36,7 +36,7 @@ def short_spec() -> TraverseSpec:
 @pytest.fixture(scope="module")
 def first(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """Drive with seed 7."""
-    return read_recording(simulate(short_spec(), 7, tmp_path_factory.mktemp("a") / "run.rrd"))
+    return read_recording(simulate(short_spec(), 7, tmp_path_factory.mktemp("a") / "run.rrd").path)
 
 
 def streams(recording: Recording) -> dict[str, ArrayStruct]:
@@ -82,7 +82,7 @@ def test_another_process_makes_the_same_recording_to_the_bit(
 
 def test_another_seed_makes_another_recording(first: Recording, tmp_path: Path) -> None:
     """No stream and no image stays as it was."""
-    other = read_recording(simulate(short_spec(), 8, tmp_path / "run.rrd"))
+    other = read_recording(simulate(short_spec(), 8, tmp_path / "run.rrd").path)
     again = streams(other)
     assert [name for name, stream in streams(first).items() if stream.equals(again[name])] == []
     assert not any(np.array_equal(a, b) for a, b in zip(pairs(first), pairs(other), strict=False))
