@@ -95,7 +95,7 @@ def _score(run: Path, seed: int) -> list[Row]:
 
 def _slip_row(slips: tuple[SlipMatch, ...]) -> Row:
     """Sum up what comparing vision with the wheels found of the forced slip."""
-    forced = [match for match in slips if match.event is not None]
+    forced = [match for match in slips if match.event is not None and not match.harmless]
     row: Row = {"found_unforced": sum(match.event is None for match in slips)}
     if forced:
         row["found_in_time"] = int(forced[0].within_one_image)

@@ -8,6 +8,7 @@ import numpy as np
 
 from lpet_sim.evaluation.attribution import FORCED_SLIP
 from lpet_sim.evaluation.slip_onset import SlipFound, SlipReport
+from lpet_sim.evaluation.slip_series import SlipSeriesSpec
 from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.trajectory import Trajectory
@@ -42,6 +43,11 @@ class SlipMatch:
     def within_one_image(self) -> bool:
         """Whether the onset was found within the time between two images."""
         return self.late_s is not None and abs(self.late_s) <= self.interval_s
+
+    @property
+    def harmless(self) -> bool:
+        """Whether the event cost less motion than slip can be told of, as in a point turn."""
+        return self.event is not None and self.lost_true_m < SlipSeriesSpec().min_step_m
 
     @property
     def text(self) -> str:

@@ -114,7 +114,7 @@ def _slip_cells(match: SlipMatch) -> tuple[Text | str, ...]:
     found, late = match.found, match.late_s
     lost = "-" if found is None else f"{found.lost_m:.3f}"
     in_time: Text | str = "-"
-    if match.event is not None:
+    if match.event is not None and not (found is None and match.harmless):
         told = "" if late is None else f"{late:+.1f} s ({match.interval_s:.1f} s) "
         in_time = Text(told).append_text(pass_or_fail(match.within_one_image))
     return (

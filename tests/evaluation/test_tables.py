@@ -76,7 +76,7 @@ def test_the_causes_of_the_error_are_rows() -> None:
 
 
 def test_a_slip_is_told_with_its_delay_and_what_it_cost() -> None:
-    """Found in time, found late, missed, and found without anything forced."""
+    """Found in time, late, missed, with nothing to find, and found without anything forced."""
     event = Event(300_000_000_000, "forced_slip", 5.0)
     times = (300_200_000_000, 305_000_000_000, 306_000_000_000, (298_800_000_000, 302_400_000_000))
     found = SlipFound(*times, lost_m=0.137, slip=0.7, sigmas=5.0)
@@ -84,6 +84,7 @@ def test_a_slip_is_told_with_its_delay_and_what_it_cost() -> None:
         SlipMatch(event, found, 0.139, 3.6),
         SlipMatch(event, found, 0.139, 0.1),
         SlipMatch(event, None, 0.139, 3.6),
+        SlipMatch(event, None, -0.001, 3.6),
         SlipMatch(None, found, 0.139, 3.6),
     ]
     table = slip_table(matches)
@@ -91,5 +92,5 @@ def test_a_slip_is_told_with_its_delay_and_what_it_cost() -> None:
     for part in ("forced slip at 300.0 s for 5.0 s", "300.2 s", "0.137 (0.139)", "- (0.139)"):
         assert part in text
     late = [str(cell) for cell in table.columns[2].cells]
-    assert late == ["+0.2 s (3.6 s) PASS", "+0.2 s (0.1 s) FAIL", "FAIL", "-"]
+    assert late == ["+0.2 s (3.6 s) PASS", "+0.2 s (0.1 s) FAIL", "FAIL", "-", "-"]
     assert "no forced slip" in text and "not found" in text
