@@ -92,6 +92,14 @@ def test_the_experiments_fill_their_tables(tmp_path: Path) -> None:
     assert "forced_slip" in summary.read_text()
 
 
+def test_the_fitted_soil_is_set_beside_what_was_measured(tmp_path: Path) -> None:
+    """The table has every measured slope, and says which the fitted soil cannot climb."""
+    printed = run_quick("grc1_fit.py", tmp_path, "--out", str(tmp_path / "fit"))
+    rows = list(csv.DictReader(written_by(printed)[0].read_text().splitlines()))
+    assert len(rows) == 7
+    assert [row["slip_fitted_percent"] for row in rows[5:]] == ["cannot climb"] * 2
+
+
 @pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.stem)
 def test_a_scenario_file_is_a_traverse(path: Path) -> None:
     """It loads, is called what its file is called, and goes to YAML and back unchanged."""
