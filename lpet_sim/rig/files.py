@@ -14,11 +14,11 @@ import numpy as np
 
 from lpet_sim.outputs import whole_file
 from lpet_sim.rig.slope import SlopeReport
-from lpet_sim.rig.slope_drive import SlopePoint
+from lpet_sim.rig.slope_point import SlopePoint
 from lpet_sim.rig.wheel import WheelCurve, slip_scale
 from lpet_sim.rover.mjcf import WHEELS
 
-Cell = str | float
+Cell = str | float | None
 
 _PER_WHEEL = ("slip_percent", "load_N", "traction_over_load", "sinkage_mm")
 SLOPE_HEADER = (
@@ -70,7 +70,7 @@ def _slope_row(point: SlopePoint) -> list[Cell]:
         math.degrees(point.slope_rad),
         point.ended,
         100 * point.slip,
-        100 * point.slip_std,
+        None if point.slip_std is None else 100 * point.slip_std,
         math.degrees(point.drift_rad),
         math.degrees(point.turned_rad),
         1e3 * point.sinkage_m,
@@ -107,6 +107,6 @@ def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[Cell]]) ->
 
 def _text(cell: Cell) -> str:
     """Give a number with six digits; one that is not known gives an empty cell."""
-    if isinstance(cell, str):
-        return cell
+    if cell is None or isinstance(cell, str):
+        return cell or ""
     return f"{cell:.6g}" if math.isfinite(cell) else ""

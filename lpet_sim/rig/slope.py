@@ -19,7 +19,8 @@ import lpet_sim
 from lpet_sim.outputs import output_folder, whole_file
 from lpet_sim.progress import Progress, silent, track
 from lpet_sim.rig.bed import TiltBed
-from lpet_sim.rig.slope_drive import Heading, SlopePoint, drive_on_bed
+from lpet_sim.rig.slope_drive import drive_on_bed
+from lpet_sim.rig.slope_point import Heading, SlopePoint
 from lpet_sim.rover.mjcf import model_path, models_folder
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.soil.load import published_curves

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
@@ -13,14 +13,12 @@ from lpet_sim.geometry import SE3, so3
 from lpet_sim.recording.arrays import NS_PER_S, Array
 from lpet_sim.recording.truth import Truth, WheelTruth
 from lpet_sim.rig.bed import TiltBed
+from lpet_sim.rig.slope_point import Ended, Heading, SlopePoint
 from lpet_sim.rover.scene import Scene, build_scene
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.rover.truth_log import TruthLog
 
 _log = logging.getLogger(__name__)
-
-Heading = Literal["up", "down", "across"]
-Ended = Literal["steady", "unsteady", "slides back", "slides", "stalled", "tipped"]
 
 YAW_RAD: Final[dict[Heading, float]] = {"up": 0.0, "down": math.pi, "across": math.pi / 2}
 """Heading of the rover in the world on a bed that rises towards x."""
@@ -37,52 +35,6 @@ _PATIENCE: Final = 4.0  # a window may take so many times as long as the wheels 
 _RUNAWAY: Final = 4.0  # a body faster than the wheels by this factor slides
 _LEAST_LOAD_N: Final = 1.0
 _TIPPED_COSINE: Final = math.cos(math.radians(45.0))
-
-
-@dataclass(frozen=True)
-class SlopePoint:
-    """What one drive on the bed measured in its steady part.
-
-    Attributes:
-        slope_rad: Tilt of the bed.
-        heading: Which way the rover drove: up or down the slope, or across it.
-        ended: ``steady``; ``unsteady`` (it never came to rest about a mean); ``slides back`` (slip
-            of 100 % or more, steadily); ``slides`` (away, faster than its wheels turn);
-            ``stalled`` (the wheels did not turn); ``tipped``.
-        slip: ``1 - v / (r omega)``, mean over the wheels and the time; v is that of the wheels'
-            centres along their planes, omega the true rate.
-        slip_std: Standard deviation over time of the wheels' mean.
-        drift_rad: Angle from the rover's forward axis to its motion, towards downhill.
-        turned_rad: How far the rover has turned since it was set down, towards downhill.
-        rolled_m: Distance rolled in all.
-        wheel_slip: Slip of each wheel.
-        wheel_load_n: Load of each wheel [N].
-        wheel_traction: Traction over load of each wheel.
-        wheel_sinkage_m: Sinkage of each wheel [m].
-    """
-
-    slope_rad: float
-    heading: Heading
-    ended: Ended
-    slip: float
-    slip_std: float
-    drift_rad: float
-    turned_rad: float
-    rolled_m: float
-    wheel_slip: tuple[float, ...]
-    wheel_load_n: tuple[float, ...]
-    wheel_traction: tuple[float, ...]
-    wheel_sinkage_m: tuple[float, ...]
-
-    @property
-    def held(self) -> bool:
-        """Whether the drive came to a steady motion, be it backwards."""
-        return self.ended in ("steady", "slides back")
-
-    @property
-    def sinkage_m(self) -> float:
-        """Mean sinkage of the wheels [m]."""
-        return float(np.mean(self.wheel_sinkage_m))
 
 
 @dataclass(frozen=True)
@@ -139,12 +91,14 @@ class _StraightDrive:
 
     def run(self, heading: Heading) -> SlopePoint:
         """Settle, roll stretch by stretch, and measure the last two."""
-        self._settle()
+        settled = self._settle()
         start = self._pose()
         self._angle_start = self._angle()
-        ended = self._roll_until_steady()
+        ended = self._roll_until_steady() if settled is None else self._sample_end(settled)
         last = self._windows[-2:]
         slip = np.mean([window.slip for window in last], axis=0)
+        if ended == "slides":
+            slip = np.full(6, self._slip_of_slide())
         if ended == "steady" and slip.mean() >= 1.0:
             ended = "slides back"
         return SlopePoint(
@@ -152,7 +106,7 @@ class _StraightDrive:
             heading=heading,
             ended=ended,
             slip=float(slip.mean()),
-            slip_std=float(np.concatenate([window.slip_mean for window in last]).std()),
+            slip_std=_spread(last) if ended != "slides" else None,
             drift_rad=float(np.mean([window.drift_rad for window in last])),
             turned_rad=self._turned(start, self._pose()),
             rolled_m=self._rolled_m(),
@@ -162,10 +116,22 @@ class _StraightDrive:
             wheel_sinkage_m=_mean([window.sinkage_m for window in last]),
         )
 
-    def _settle(self) -> None:
-        self._scene.command(np.zeros(6), np.zeros(6))
-        for _ in range(round(_SETTLE_S / self._dt_s)):
-            self._scene.step()
+    def _settle(self) -> Ended | None:
+        """Stand with the brakes on until the suspension rests; tell if they do not hold."""
+        for tick in range(round(_SETTLE_S / _SAMPLE_S)):
+            self._advance(0.0)
+            landed = tick * _SAMPLE_S > _SETTLE_S / 2
+            failure = self._runs_away() if landed else None
+            if failure is not None:
+                return failure
+        self._step = 0
+        self._log.take()
+        return None
+
+    def _sample_end(self, ended: Ended) -> Ended:
+        """Keep the last moments of a rover that did not wait for its wheels to turn."""
+        self._windows.append(self._take())
+        return ended
 
     def _roll_until_steady(self) -> Ended:
         least, most = _WINDOWS
@@ -183,18 +149,18 @@ class _StraightDrive:
         last_step = self._step + round(patience / self._dt_s)
         failure: Ended | None = None
         while failure is None and self._rolled_m() < until_m:
-            self._advance()
+            self._advance(self._rate_radps)
             failure = "stalled" if self._step >= last_step else self._runs_away()
         self._windows.append(self._take())
         return failure
 
-    def _advance(self) -> None:
+    def _advance(self, rate_radps: float) -> None:
         """Sample, command, and step until the next sample is due."""
         self._sample()
         share = min(1.0, self._step * self._dt_s / _RAMP_S)
         self._scene.follow()
         self._scene.refresh_soil()
-        self._scene.command(np.zeros(6), np.full(6, share * self._rate_radps))
+        self._scene.command(np.zeros(6), np.full(6, share * rate_radps))
         for _ in range(self._sample_steps):
             self._scene.step()
         self._step += self._sample_steps
@@ -206,6 +172,8 @@ class _StraightDrive:
 
     def _runs_away(self) -> Ended | None:
         row = self._scene.body_row()
+        if self._scene.data.time < (self._step - 1) * self._dt_s:
+            return "physics failed"
         if self._upright(row) < _TIPPED_COSINE:
             return "tipped"
         fastest = _RUNAWAY * self._speed_mps
@@ -229,6 +197,12 @@ class _StraightDrive:
             sinkage_m=wheels.sinkage_m.mean(axis=0),
             drift_rad=self._drift(truth),
         )
+
+    def _slip_of_slide(self) -> float:
+        """Slip of the body now over the rim speed that is asked: the wheels may hardly turn yet."""
+        row = self._scene.body_row()
+        ahead = self._axes(so3.from_quat_wxyz(row[3:7]))[0]
+        return 1.0 - float(row[7:10] @ ahead) / self._speed_mps
 
     def _drift(self, truth: Truth) -> float:
         """Angle from forward to the motion, towards downhill; 0 where across is level [rad]."""
@@ -266,6 +240,11 @@ def _slip(wheels: WheelTruth) -> Array:
     total = turned.sum(axis=0)
     safe = np.where(np.abs(total) < 1e-9, 1.0, total)
     return np.where(total == safe, (wheels.slip[1:] * turned).sum(axis=0) / safe, 0.0)
+
+
+def _spread(windows: list[_Window]) -> float:
+    """Standard deviation over time of the wheels' mean slip."""
+    return float(np.concatenate([window.slip_mean for window in windows]).std())
 
 
 def _mean(rows: list[Array]) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lpet_sim.rig.slope import SlopeReport
-from lpet_sim.rig.slope_drive import Heading, SlopePoint
+from lpet_sim.rig.slope_point import Heading, SlopePoint
 from lpet_sim.soil.published import PublishedCurve
 
 # Okabe and Ito's colours, told apart by the colour-blind too.
@@ -36,7 +36,13 @@ def plot_slope(report: SlopeReport, published: Sequence[PublishedCurve] = ()) ->
     """
     figure = Figure(figsize=(8.0, 9.0), layout="constrained")
     rows = figure.subplots(3, 1, sharex=True, height_ratios=(3, 1, 1))
-    _draw(rows[0], report, report.spec.headings, lambda p: 100 * p.slip, lambda p: 100 * p.slip_std)
+    _draw(
+        rows[0],
+        report,
+        report.spec.headings,
+        lambda p: 100 * p.slip,
+        lambda p: 100 * (p.slip_std or 0.0),
+    )
     _draw_published(rows[0], published)
     rows[0].axhline(100.0, color="black", lw=1, ls=":")
     rows[0].set_ylabel("slip [%]")

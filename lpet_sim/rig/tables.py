@@ -13,7 +13,7 @@ from rich.text import Text
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rig.measured import WheelMeasurements
 from lpet_sim.rig.slope import SlopeReport
-from lpet_sim.rig.slope_drive import Heading, SlopePoint
+from lpet_sim.rig.slope_point import Heading, SlopePoint
 from lpet_sim.rig.wheel import WheelCurve, slip_scale
 from lpet_sim.rover.mjcf import WHEELS
 from lpet_sim.soil.load import load_soil, published_curves, soil_names
@@ -55,7 +55,7 @@ def _slope_table(report: SlopeReport, heading: Heading, beside: Sequence[Publish
             f"{math.degrees(point.slope_rad):.2f}",
             f"{100 * point.slip:.2f}",
             *(_published_slip(point, curve) for curve in beside),
-            f"{100 * point.slip_std:.2f}",
+            "-" if point.slip_std is None else f"{100 * point.slip_std:.2f}",
             f"{math.degrees(point.drift_rad):.2f}",
             f"{math.degrees(point.turned_rad):.2f}",
             f"{1e3 * point.sinkage_m:.1f}",
