@@ -153,9 +153,7 @@ def _at_side_force(row: Array, side: float, scale: float, out: Array) -> None:
 
 
 @njit(cache=True)
-def _along_curve(
-    slips: Array, curve: Array, ratios: Array, friction: float, value: Array
-) -> None:
+def _along_curve(slips: Array, curve: Array, ratios: Array, friction: float, value: Array) -> None:
     """Write the inverse of one curve of traction over slip, Shape (ratios, 4)."""
     peak = int(np.argmax(curve[:, _T]))
     k = 0

@@ -25,6 +25,8 @@ _POINTS: Final = 0.5 * (_x + 1.0)
 _WEIGHTS: Final = 0.5 * _w
 _SCAN_STEPS: Final = 12
 _ITERATIONS: Final = 80
+_BALANCE: Final = 1e-11  # of the load, within which the vertical force meets it
+_NEAR: Final = 0.04  # share of a guessed angle by which the right one may differ
 
 
 class Law(NamedTuple):
@@ -163,7 +165,9 @@ def _add_stresses(
     tau_x, tau_y = shear_stress(law, motion, theta, entry, sigma)
     area = law.radius * law.width * step
     sine, cosine = math.sin(theta), math.cos(theta)
-    flank = flank_resistance(law, motion, theta, entry) * law.radius * cosine * step
+    flank = 0.0
+    if motion.creep != 0.0:
+        flank = flank_resistance(law, motion, theta, entry) * law.radius * cosine * step
     sums[VERTICAL] += area * (sigma * cosine + tau_x * sine)
     sums[DRAWBAR] += area * (tau_x * cosine - sigma * sine)
     sums[SIDE] -= area * tau_y + math.copysign(flank, motion.creep)
@@ -193,27 +197,44 @@ def contact_sums(law: Law, motion: Motion, entry: float, sums: Array) -> None:
 
 
 @njit(cache=True)
-def solve_entry(law: Law, motion: Motion, load: float, sums: Array) -> float:
+def solve_entry(law: Law, motion: Motion, load: float, guess: float, sums: Array) -> float:
     """Find the entry angle at which the vertical force is the load [rad]; sums are left in `sums`.
 
-    The first crossing is bracketed by steps from the surface, then closed in by regula falsi with
-    the Illinois halving.
+    A crossing close to the guess is taken if there is one; else the first is bracketed by steps
+    from the surface. It is closed in by regula falsi with the Illinois halving.
+
+    Args:
+        law: Soil, wheel and gravity.
+        motion: The wheel's motion.
+        load: Vertical load [N].
+        guess: A likely angle, such as that of a wheel which moves nearly alike; 0 for none.
+        sums: Filled.
 
     Returns:
-        The angle, or below 0 (minus `ENTRY_LIMIT_RAD`) where no contact up to the limit carries
-        the load.
+        The angle, or minus `ENTRY_LIMIT_RAD` where no contact up to the limit carries the load.
     """
+    low, high = guess * (1.0 - _NEAR), min(guess * (1.0 + _NEAR), ENTRY_LIMIT_RAD)
+    if guess > 0.0:
+        f_low = _excess(law, motion, load, low, sums)
+        if f_low < 0.0:
+            f_high = _excess(law, motion, load, high, sums)
+            if f_high >= 0.0:
+                return _close_in(law, motion, load, low, f_low, high, f_high, sums)
     low, f_low, high, f_high = 0.0, -load, 0.0, -load
     for k in range(1, _SCAN_STEPS + 1):
         high = ENTRY_LIMIT_RAD * (k / _SCAN_STEPS) ** 1.5
-        contact_sums(law, motion, high, sums)
-        f_high = sums[VERTICAL] - load
+        f_high = _excess(law, motion, load, high, sums)
         if f_high >= 0.0:
-            break
+            return _close_in(law, motion, load, low, f_low, high, f_high, sums)
         low, f_low = high, f_high
-    if f_high < 0.0:
-        return -ENTRY_LIMIT_RAD
-    return _close_in(law, motion, load, low, f_low, high, f_high, sums)
+    return -ENTRY_LIMIT_RAD
+
+
+@njit(cache=True)
+def _excess(law: Law, motion: Motion, load: float, entry: float, sums: Array) -> float:
+    """Give the vertical force at an entry angle less the load [N]."""
+    contact_sums(law, motion, entry, sums)
+    return float(sums[VERTICAL]) - load
 
 
 @njit(cache=True)
@@ -230,9 +251,8 @@ def _close_in(
     entry, side = high, 0
     for _ in range(_ITERATIONS):
         entry = (low * f_high - high * f_low) / (f_high - f_low)
-        contact_sums(law, motion, entry, sums)
-        f = sums[VERTICAL] - load
-        if abs(f) <= 1e-12 * load or high - low < 1e-15:
+        f = _excess(law, motion, load, entry, sums)
+        if abs(f) <= _BALANCE * load or high - low < 1e-15:
             break
         if f < 0.0:
             low, f_low, f_high = entry, f, f_high * (0.5 if side < 0 else 1.0)
@@ -246,8 +266,9 @@ def _close_in(
 @njit(cache=True)
 def forces_into(law: Law, slip: Array, creep: Array, load: Array, out: Array) -> None:
     """Write, for each wheel, the contact's sums and its entry angle, Shape (n, `SUMS` + 1)."""
-    sums = np.empty(SUMS)
+    sums, guess = np.empty(SUMS), 0.0
     for i in range(slip.size):
         motion = motion_of(law, slip[i], creep[i])
-        out[i, SUMS] = solve_entry(law, motion, load[i], sums)
+        guess = solve_entry(law, motion, load[i], guess, sums)
+        out[i, SUMS] = guess
         out[i, :SUMS] = sums

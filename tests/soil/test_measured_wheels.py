@@ -12,7 +12,6 @@ from lpet_sim.soil.measured_wheels import (
     MeasuredWheel,
     WheelName,
     measured_wheel,
-    predict,
     prediction_error,
     straight,
 )
