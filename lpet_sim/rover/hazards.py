@@ -134,7 +134,7 @@ class HungUp:
 
     def describe(self, tick: Tick) -> str:
         """Say what the belly carries."""
-        return f"the belly carries {self._carried:.0%} of the weight and hangs up, {tick.place}"
+        return f"hangs up: the belly carries {self._carried:.0%} of the weight, {tick.place}"
 
 
 class Stuck:
