@@ -13,7 +13,13 @@ from lpet_sim.recording.wheel_curves import TITLES
 
 _SKY = (38, 32, 30, 255)
 _UP = (0.0, 0.0, 1.0)
-_BACKDROP = (layout.TERRAIN, layout.LANDMARKS, layout.PATHS, layout.EVENT_PLACES)
+_BACKDROP = (
+    layout.TERRAIN,
+    layout.LANDMARKS,
+    layout.PATHS,
+    layout.EVENT_PLACES,
+    *layout.CAMERAS.values(),
+)
 _COUNTS = ("inliers", "matches", "bridged")
 
 # Of the window's height: the width of the right column, and the title of a view.

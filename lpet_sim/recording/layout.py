@@ -20,7 +20,8 @@ EVENT_LOG = "/events"
 ESTIMATES = "/estimates"
 ERRORS = "/errors"
 WHEEL_CURVES = "/curves/wheels"
-SEEN_SLIP = "/curves/seen_slip"
+# Sorts after the wheels, so that it is drawn over them.
+SEEN_SLIP = "/curves/wheels_seen"
 
 WORLD = "/world"
 ROVER = "/world/rover"
