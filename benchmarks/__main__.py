@@ -14,7 +14,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import camera, physics, pipeline, store, vision
+from benchmarks import camera, physics, pipeline, store, vision, wheel_law
 from benchmarks.case import Case
 from benchmarks.timing import Row, tell
 from lpet_sim.outputs import output_folder, whole_file
@@ -59,6 +59,8 @@ def run(case: Case) -> list[Row]:
     tell("physics ...")
     world = case.build()
     driven = physics.measure(world)
+    tell("wheels on soil ...")
+    law = wheel_law.measure(case.build(), case.repetitions)
     tell("cameras ...")
     seen = camera.measure(world, case.poses(driven.pieces), StereoCameraSpec.small())
     tell("vision ...")
@@ -76,7 +78,7 @@ def run(case: Case) -> list[Row]:
     hz = 1.0 / spec.rover.physics_dt_s
     bare = pipeline.BareParts(driven.bare, (seen.bare, looked.bare, stored.bare), hz)
     whole = pipeline.rows(done, bare, simulated_s)
-    return [driven.row, *seen.rows, *looked.rows, *stored.rows, *whole]
+    return [driven.row, *law, *seen.rows, *looked.rows, *stored.rows, *whole]
 
 
 def _machine() -> dict[str, object]:
