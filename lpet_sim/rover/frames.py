@@ -23,6 +23,7 @@ class RoverFrames:
         wheel_names: Names of the wheels; their order everywhere.
         wheel_position_body_m: Centres of the wheels in the body [m], Shape (6, 3).
         wheel_radius_m: Radius of the wheels [m].
+        wheel_width_m: Width of the wheels [m].
         steer_limit_rad: Largest steering angle of each wheel [rad], Shape (6,).
         suspension_joints: Names of the joints of `WheelTruth.joint_angle_rad`, in its order.
         mass_kg: Mass of the whole rover [kg].
@@ -35,6 +36,7 @@ class RoverFrames:
     wheel_names: tuple[str, ...]
     wheel_position_body_m: Array
     wheel_radius_m: float
+    wheel_width_m: float
     steer_limit_rad: Array
     suspension_joints: tuple[str, ...]
     mass_kg: float
@@ -44,6 +46,11 @@ class RoverFrames:
     def contact_body_m(self) -> Array:
         """Lowest points of the wheels in the body, on flat ground at rest [m], Shape (6, 3)."""
         return self.wheel_position_body_m - [0.0, 0.0, self.wheel_radius_m]
+
+    @property
+    def wheel_share_n(self) -> float:
+        """An equal share of the weight for each wheel [N]."""
+        return self.mass_kg * self.gravity_mps2 / len(self.wheel_names)
 
     @property
     def ride_height_m(self) -> float:
@@ -66,6 +73,7 @@ def rover_frames(spec: RoverSpec) -> RoverFrames:
         wheel_names=WHEELS,
         wheel_position_body_m=np.array([body_pose(spec, f"wheel_{w}").translation for w in WHEELS]),
         wheel_radius_m=float(model.geom("wheel_front_left").size[0]),
+        wheel_width_m=float(2 * model.geom("wheel_front_left").size[1]),
         steer_limit_rad=np.array([model.joint(f"steer_{w}").range[1] for w in WHEELS]),
         suspension_joints=tuple(name for name in joints if name.startswith("bogie_")),
         mass_kg=float(model.body("body").subtreemass[0]),

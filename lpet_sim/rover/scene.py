@@ -20,13 +20,12 @@ from lpet_sim.rover.frames import RoverFrames, rover_frames
 from lpet_sim.rover.ground import Ground, cut_patch
 from lpet_sim.rover.mjcf import WHEELS, compile_on
 from lpet_sim.rover.spec import RoverSpec
-from lpet_sim.rover.wheel_forces import split_forces, turn_surfaces_back
-from lpet_sim.rover.wheel_soil import TabulatedSlip, WheelSoilLaw, WheelState
+from lpet_sim.rover.wheel_contact import WheelContact, WheelIndex, law_on
+from lpet_sim.rover.wheel_soil import WheelSoilLaw, WheelState
 
 _REACH_M = 1.25  # farthest part of a wheel from the body's origin, with room to spare
 _ROCK_MARGIN_M = 1.0  # rocks are found by their centre; the largest reach this far
 _LIFT_STEP_M = 0.01
-_HELD = np.ones(6)  # slip of wheels that turn and do not move
 
 
 class Scene:
@@ -36,7 +35,7 @@ class Scene:
         ground: The terrain.
         spec: The rover.
         frames: Its frames.
-        law: The wheel-soil law, asked at every step.
+        contact: The wheels on the ground, with the law that is asked at every step.
         patch_changes: How often the ground has been cut anew.
     """
 
@@ -45,12 +44,12 @@ class Scene:
         self.ground = ground
         self.spec = spec
         self.frames: RoverFrames = rover_frames(spec)
-        self.law = law
+        radius_m, share_kg = self.frames.wheel_radius_m, self.frames.mass_kg / len(WHEELS)
+        dt_s = spec.physics_dt_s
+        self.contact = WheelContact(law, spec.wheel_soil, radius_m, share_kg, dt_s)
         self.patch_changes = 0
         self.step_count = 0
         self._held = False
-        self._slip = np.zeros(6)
-        self._soil = np.zeros(6, dtype=np.int64)
 
     @property
     def xy(self) -> Array:
@@ -72,7 +71,7 @@ class Scene:
     @property
     def sinkage_m(self) -> Array:
         """How deep each wheel stands in the soil [m], Shape (6,)."""
-        return np.zeros(6)
+        return self.contact.motion[2].copy()
 
     @property
     def belly_load_n(self) -> float:
@@ -95,10 +94,14 @@ class Scene:
         slope_x, slope_y, level = np.linalg.lstsq(plane, height, rcond=None)[0]
         pose = SE3(_facing(slope_x, slope_y, yaw_rad), np.zeros(3))
         centre = np.array([*xy, level])
-        self._qpos[:3] = centre + self.frames.ride_height_m * pose.rotation[:, 2]
+        up = pose.rotation[:, 2]
+        self._qpos[:3] = centre + self.frames.ride_height_m * up
         self._qpos[3:7] = pose.quat_wxyz()
+        mujoco.mj_kinematics(self.model, self.data)
+        depth = self.contact.stand(self.ground, self.frames.wheel_share_n * up[2])
+        self._bind()
+        self._qpos[:3] -= depth * up
         self._lift_clear()
-        self.refresh_soil()
 
     def _lift_clear(self) -> None:
         """Raise the rover until nothing touches, since it may have been put inside a rock."""
@@ -113,7 +116,8 @@ class Scene:
         The drives integrate their rate to an angle, which lets them brake without creep. A wheel
         that stalls must not save up a turn for later: the angle is kept within the motor's reach.
         """
-        angle = self._qpos[self._drive_qpos]
+        lag = self._drive_lag_s * self._qvel[self._drive_dof]
+        angle = self._qpos[self._drive_qpos] + lag
         self._act[:] = np.clip(self._act, angle - self._drive_reach, angle + self._drive_reach)
         self._ctrl[self._steer_act] = steer_rad
         self._ctrl[self._drive_act] = rate_radps
@@ -126,33 +130,21 @@ class Scene:
         """Advance by one physics step, and set the slip of the next from the traction of this."""
         mujoco.mj_step(self.model, self.data)
         self.step_count += 1
-        wheels = self.wheel_state()
-        target = _HELD if self._held else self.law.slip(wheels)
-        turn_surfaces_back(
-            self._surfacevel,
-            self._wheel_geom,
-            self._slip,
-            target,
-            self._filter_gain,
-            wheels.omega_radps,
-        )
+        self.contact.step(self.ground, self._held)
 
     def wheel_state(self) -> WheelState:
-        """Give what the wheel-soil law is told of the wheels now."""
-        traction, load, omega, on_rock = split_forces(
-            self._contacts,
-            self._geom_xmat,
-            self._wheel_geom,
-            self._qfrc_constraint,
-            self._drive_dof,
-            self._qvel,
-            self.frames.wheel_radius_m,
-        )
-        return WheelState(traction, load, omega, self._soil, on_rock)
+        """Give the forces of the last step on the wheels, as the wheel-soil law is told of them.
+
+        The law itself is told of their means over a short time.
+        """
+        ahead, side, load, rate = self.contact.read().copy()
+        told = self.contact.wheels
+        along = np.copysign(1.0, rate) * ahead
+        return WheelState(along, side, load, rate, told.soil.copy(), told.on_rock.copy())
 
     def refresh_soil(self) -> None:
-        """Look up the soil under the wheels."""
-        self._soil = self.ground.soil(self.data.xpos[self._wheel_body, :2])
+        """Look up now what lies under the wheels; `step` does so ten times a second by itself."""
+        self.contact.look_under(self.ground)
 
     def follow(self) -> None:
         """Cut the ground anew around the rover when it nears the edge of its patch."""
@@ -187,16 +179,14 @@ class Scene:
         for wheel in WHEELS:
             mine = self.model.geom(f"wheel_{wheel}").id
             theirs = model.geom(f"wheel_{wheel}").id
-            model.geom_surfacevel[theirs] = self.model.geom_surfacevel[mine]
+            for name in ("geom_surfacevel", "geom_friction"):
+                getattr(model, name)[theirs] = getattr(self.model, name)[mine]
             data.geom_xmat[theirs] = self.data.geom_xmat[mine]
 
     def _bind(self) -> None:
         """Keep views of MuJoCo's arrays: looking them up at every step would cost more."""
         model, data = self.model, self.data
         self._qpos, self._qvel, self._ctrl, self._act = data.qpos, data.qvel, data.ctrl, data.act
-        self._geom_xmat, self._qfrc_constraint = data.geom_xmat, data.qfrc_constraint
-        self._surfacevel = model.geom_surfacevel
-        self._wheel_geom = self._ids("geom", "wheel_")
         self._belly_geom = model.geom("belly").id
         self._wheel_body = self._ids("body", "wheel_")
         self._leg_body = self._ids("body", "leg_")
@@ -204,6 +194,8 @@ class Scene:
         self._steer_act = self._ids("actuator", "steer_")
         limit = model.actuator_forcerange[self._drive_act, 1]
         self._drive_reach = limit / model.actuator_gainprm[self._drive_act, 0]
+        damping = model.actuator_biasprm[self._drive_act]
+        self._drive_lag_s = damping[:, 2] / damping[:, 1]
         self._drive_dof = np.array([model.joint(f"drive_{w}").dofadr[0] for w in WHEELS])
         self._drive_qpos = np.array([model.joint(f"drive_{w}").qposadr[0] for w in WHEELS])
         self._steer_qpos = np.array([model.joint(f"steer_{w}").qposadr[0] for w in WHEELS])
@@ -211,7 +203,8 @@ class Scene:
         self._suspension_qpos = np.array([model.joint(j).qposadr[0] for j in joints])
         start = model.sensor("load_front_left").adr[0]
         self._contacts = data.sensordata[start : start + 30].reshape(6, 5)
-        self._filter_gain = -np.expm1(-self.spec.physics_dt_s / self.spec.wheel_soil.filter_s)
+        at = np.stack([self._ids("geom", "wheel_"), self._wheel_body, self._drive_dof])
+        self.contact.bind(model, data, WheelIndex(at, int(start)))
 
     def _ids(self, kind: str, prefix: str) -> NDArray[np.int64]:
         look_up = getattr(self.model, kind)
@@ -223,16 +216,15 @@ class Scene:
 
     def wheel_row(self) -> Array:
         """Give the wheels' and joints' state as one row, for `truth_log`, Shape (78 + j,)."""
-        load = self.wheel_state().load_n
         return np.concatenate(
             [
                 self._qpos[self._drive_qpos],
                 self._qpos[self._steer_qpos],
-                load,
+                self.contact.read()[2],
                 self._contact_kinds(),
                 self.data.xpos[self._wheel_body].ravel(),
                 self.data.xquat[self._leg_body].ravel(),
-                -self._qfrc_constraint[self._drive_dof] / self.frames.wheel_radius_m,
+                self.contact.force[0],
                 self.sinkage_m,
                 self._qpos[self._suspension_qpos],
             ]
@@ -268,15 +260,14 @@ def build_scene(
         spec: The rover.
         start_xy_m: Where, in the world [m].
         start_yaw_rad: Its heading [rad].
-        law: The wheel-soil law; None for the table of the spec.
+        law: The wheel-soil law; None for that of the terrain's soils as the spec says.
 
     Raises:
         UnknownNameError: There is no such rover model.
         PlanningError: The start lies outside the drivable ground.
     """
     check_drivable(ground, np.array([start_xy_m], dtype=float))
-    law = law or TabulatedSlip(spec.wheel_soil, ground.spec.soils)
-    scene = Scene(ground, spec, law)
+    scene = Scene(ground, spec, law or law_on(ground, spec))
     scene.place(np.asarray(start_xy_m, dtype=float), start_yaw_rad)
     return scene
 

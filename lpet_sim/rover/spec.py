@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from lpet_sim.rover.wheel_soil import TabulatedSlipSpec
+from lpet_sim.rover.wheel_soil import WheelSoilSpec
 from lpet_sim.spec import Spec
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -32,7 +32,7 @@ class RoverSpec(Spec):
         rock_min_diameter_m: Smaller rocks are pressed into the soil and not collided with
             (assumption: half the wheel's width).
         steer_rate_radps: Fastest steering (assumption, 6 deg/s).
-        wheel_soil: The law of wheel slip.
+        wheel_soil: How its wheels follow the law of the soil under them.
     """
 
     model: str = "exomars"
@@ -40,7 +40,7 @@ class RoverSpec(Spec):
     patch_m: Annotated[float, Field(ge=4.0, le=32.0)] = 8.0
     rock_min_diameter_m: Annotated[float, Field(ge=0.02, le=0.5)] = 0.06
     steer_rate_radps: Annotated[float, Field(gt=0.0, le=1.0)] = math.radians(6.0)
-    wheel_soil: TabulatedSlipSpec = TabulatedSlipSpec()
+    wheel_soil: WheelSoilSpec = Field(default_factory=WheelSoilSpec)
 
 
 class ForcedSlip(Spec):

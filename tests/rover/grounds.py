@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.terrain.box import Box
-from lpet_sim.terrain.spec import TerrainSpec
+from lpet_sim.terrain.spec import SoilClass, TerrainSpec
 
 
 @dataclass(frozen=True)
@@ -65,3 +65,13 @@ class Waves:
         keep = inside & (diameter >= min_diameter_m)
         p = np.column_stack([rows[keep, :2], self.height(rows[keep, :2])])
         return Boulders(np.flatnonzero(keep), p, diameter[keep])
+
+
+def of_soil(name: str) -> TerrainSpec:
+    """Give a terrain of one soil of the library."""
+    return TerrainSpec(soils=(SoilClass.model_validate({"name": "soil", "soil": name}),))
+
+
+def tilted(slope_x: float, slope_y: float = 0.0, soil: str = "grc1_loose") -> Waves:
+    """Give an even slope of one soil, by default the one whose slip is a measured table."""
+    return Waves(slope_x=slope_x, slope_y=slope_y, spec=of_soil(soil))

@@ -117,7 +117,8 @@ def test_during_a_forced_slip_odometry_advances_and_the_rover_does_not(driven: D
     angle = driven.wheels("drive_angle_rad")[(tw >= 50) & (tw <= 55)]
     np.testing.assert_allclose(0.1425 * (angle[-1] - angle[0]).mean(), 0.25, rtol=0.05)
     slip = driven.wheels("slip")[(tw >= 51) & (tw <= 55)]
-    np.testing.assert_allclose(slip, 1.0, atol=0.05)
+    np.testing.assert_allclose(slip, 1.0, atol=0.1)  # the wheels go on steering
+    np.testing.assert_allclose(slip.mean(axis=0), 1.0, atol=0.01)
 
 
 def test_wheel_slip_accounts_for_the_distance_that_odometry_reads_too_much(driven: Driven) -> None:

@@ -10,7 +10,7 @@ from lpet_sim.errors import PlanningError, UnknownNameError
 from lpet_sim.rover.scene import Scene, build_scene
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.terrain.box import Box
-from tests.rover.grounds import Waves
+from tests.rover.grounds import Waves, tilted
 
 RATE_RADPS = 0.0278 / 0.1425
 BUMPS = Waves(amplitude_m=0.03)
@@ -33,13 +33,13 @@ def _roll(scene: Scene, seconds: float, rate_radps: float = RATE_RADPS) -> np.nd
 
 
 def test_the_loads_of_the_wheels_sum_to_the_weight() -> None:
-    """On even ground at rest each wheel carries a sixth, since the centre of mass is put so."""
+    """At rest on the flat each wheel carries a sixth, but for what the joints' friction holds."""
     scene = build_scene(Waves(), RoverSpec())
     _rest(scene)
     load = scene.wheel_state().load_n
     weight = scene.frames.mass_kg * scene.frames.gravity_mps2
     assert load.sum() == pytest.approx(weight, rel=1e-3)
-    np.testing.assert_allclose(load, weight / 6, rtol=0.02)
+    np.testing.assert_allclose(load, weight / 6, rtol=0.03)
 
 
 def test_on_a_slope_traction_and_load_carry_the_weight() -> None:
@@ -55,17 +55,17 @@ def test_on_a_slope_traction_and_load_carry_the_weight() -> None:
     assert state.traction_n.sum() == pytest.approx(weight * math.sin(slope), rel=0.1)
 
 
-@pytest.mark.parametrize(("slope_deg", "slip"), [(0.0, 0.025), (10.0, 0.104), (15.0, 0.340)])
+@pytest.mark.parametrize(("slope_deg", "slip"), [(0.0, 0.024), (10.0, 0.104), (15.0, 0.340)])
 def test_slip_emerges_from_the_slope_as_the_table_says(slope_deg: float, slip: float) -> None:
-    """Distance over wheel turn against the table at ``tan(slope)``, within 1.5 points."""
+    """Distance over wheel turn against the table at ``tan(slope)``, within 1 point."""
     slope = math.radians(slope_deg)
-    scene = build_scene(Waves(slope_x=math.tan(slope), amplitude_m=0.01), RoverSpec())
+    scene = build_scene(tilted(math.tan(slope)), RoverSpec())
     _rest(scene)
     _roll(scene, 3.0)
     before, turned = scene.xy, scene.wheel_row()[:6]
     _roll(scene, 15.0)
     rolled = 0.1425 * (scene.wheel_row()[:6] - turned).mean()
-    assert 1 - (scene.xy - before)[0] / math.cos(slope) / rolled == pytest.approx(slip, abs=0.015)
+    assert 1 - (scene.xy - before)[0] / math.cos(slope) / rolled == pytest.approx(slip, abs=0.01)
 
 
 @pytest.mark.parametrize("slope_deg", [0.0, 15.0])
