@@ -52,7 +52,7 @@ def plot_slope(report: SlopeReport, published: Sequence[PublishedCurve] = ()) ->
     rows[1].set_ylabel("downhill drift\nacross [deg]")
     _draw(rows[2], report, report.spec.headings, lambda p: 1e3 * p.sinkage_m)
     rows[2].set_ylabel("sinkage [mm]")
-    rows[2].set_ylim(0.0, max(rows[2].get_ylim()[1], 1.0))
+    _finish_sinkage(rows[2], report)
     rows[2].set_xlabel("slope of the bed [deg]")
     for row in rows:
         row.grid(alpha=0.3)
@@ -60,6 +60,19 @@ def plot_slope(report: SlopeReport, published: Sequence[PublishedCurve] = ()) ->
     rows[0].legend(loc="upper left", fontsize="small")
     figure.suptitle(_title(report), fontsize="medium")
     return figure
+
+
+def published_label(curve: PublishedCurve) -> str:
+    """Give a published curve's name, marked where it is quoted from memory."""
+    return f"{curve.label} [recalled]" if "[recalled]" in curve.source else curve.label
+
+
+def _finish_sinkage(axes: Axes, report: SlopeReport) -> None:
+    deepest_mm = max(1e3 * point.sinkage_m for point in report.points)
+    axes.set_ylim(0.0, max(1.15 * deepest_mm, 1.0))
+    if deepest_mm == 0:
+        text = axes.text(0.5, 0.5, "this soil's law knows no sinkage", color="gray", ha="center")
+        text.set_transform(axes.transAxes)
 
 
 def _title(report: SlopeReport) -> str:
@@ -110,6 +123,6 @@ def _draw_published(axes: Axes, published: Sequence[PublishedCurve]) -> None:
             ms=7,
             capsize=3,
             lw=1,
-            label=f"{curve.label}{' [recalled]' if '[recalled]' in curve.source else ''}",
+            label=published_label(curve),
             zorder=3,
         )

@@ -13,6 +13,7 @@ from rich.text import Text
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rig.measured import WheelMeasurements
 from lpet_sim.rig.slope import SlopeReport
+from lpet_sim.rig.slope_figure import published_label
 from lpet_sim.rig.slope_point import Heading, SlopePoint
 from lpet_sim.rig.wheel import WheelCurve, slip_scale
 from lpet_sim.rover.mjcf import WHEELS
@@ -46,7 +47,7 @@ def _slope_table(report: SlopeReport, heading: Heading, beside: Sequence[Publish
     spec = report.spec
     table = Table(title=f"{_TITLES[heading]}: {spec.rover.model} on {spec.soil.name}")
     last = ("std", "drift [deg]", "turned [deg]", "sinkage [mm]", "load [N]")
-    for text in ("slope [deg]", "slip [%]", *(curve.label for curve in beside), *last):
+    for text in ("slope [deg]", "slip [%]", *map(published_label, beside), *last):
         table.add_column(Text(text), justify="right")
     table.add_column("ended")
     for point in report.along(heading):
