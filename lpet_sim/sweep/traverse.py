@@ -16,7 +16,7 @@ from lpet_sim.recording.recording import Manifest
 from lpet_sim.rover.spec import DriveSpec, RoverSpec
 from lpet_sim.sensors.suite import SensorSuiteSpec
 from lpet_sim.spec import Spec, read_yaml
-from lpet_sim.terrain.load import load_terrain_spec
+from lpet_sim.terrain.load import load_terrain_spec, with_local_soils
 from lpet_sim.terrain.spec import TerrainSpec
 from lpet_sim.terrain.terrain import Terrain
 from lpet_sim.vision.spec import FrontEndSpec
@@ -79,16 +79,21 @@ class TraverseSpec(Spec):
 
     @classmethod
     def from_yaml(cls, path: Path | str) -> Self:
-        """Read the traverse from a YAML file; a terrain's file is looked for beside it first.
+        """Read the traverse from a YAML file; files of terrain and soils may lie beside it.
 
         Raises:
             SpecError: The file is missing, is not YAML, or holds an unknown key or a bad value.
         """
         mapping = read_yaml(Path(path))
-        if isinstance(mapping, dict) and isinstance(mapping.get("terrain"), str):
-            beside = Path(path).parent / mapping["terrain"]
-            mapping |= {"terrain": str(beside)} if beside.is_file() else {}
+        if isinstance(mapping, dict) and "terrain" in mapping:
+            mapping |= {"terrain": _beside(mapping["terrain"], Path(path).parent)}
         return cls.from_mapping(mapping, source=str(path))
+
+
+def _beside(terrain: object, folder: Path) -> object:
+    if not isinstance(terrain, str):
+        return with_local_soils(terrain, folder)
+    return str(folder / terrain) if (folder / terrain).is_file() else terrain
 
 
 def planned_drive(spec: TraverseSpec, terrain: Terrain, seed: int) -> DriveSpec:

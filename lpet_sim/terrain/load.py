@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from lpet_sim.errors import UnknownNameError
+from lpet_sim.spec import read_yaml
 from lpet_sim.terrain.spec import TerrainSpec
 
 PRESETS = Path(__file__).with_name("presets")
@@ -18,8 +19,8 @@ def preset_names() -> tuple[str, ...]:
 def load_terrain_spec(name_or_path: str | Path) -> TerrainSpec:
     """Load a terrain spec.
 
-    A DEM's relative path is looked for beside the YAML file; where it is not there it stays as it
-    is, to be looked for in the data folder when the terrain is built.
+    Relative paths of soils and of a DEM are looked for beside the YAML file. Where a DEM is not
+    there its path stays as it is, to be looked for in the data folder when the terrain is built.
 
     Args:
         name_or_path: The name of a preset, or the path of a YAML file.
@@ -34,7 +35,30 @@ def load_terrain_spec(name_or_path: str | Path) -> TerrainSpec:
     path = Path(name_or_path)
     if not path.exists() and path.suffix not in (".yaml", ".yml"):
         raise UnknownNameError("terrain preset", text, preset_names())
-    return _with_local_dem(TerrainSpec.from_yaml(path), path.resolve().parent)
+    folder = path.resolve().parent
+    spec = TerrainSpec.from_mapping(with_local_soils(read_yaml(path), folder), source=str(path))
+    return _with_local_dem(spec, folder)
+
+
+def with_local_soils(mapping: object, folder: Path) -> object:
+    """Give a terrain's mapping with the soils that are named by a file in a folder found there.
+
+    Args:
+        mapping: A terrain as read from YAML; anything else comes back as it is.
+        folder: Where relative paths begin.
+    """
+    soils = mapping.get("soils") if isinstance(mapping, dict) else None
+    if not isinstance(mapping, dict) or not isinstance(soils, list):
+        return mapping
+    return mapping | {"soils": [_with_local_soil(soil, folder) for soil in soils]}
+
+
+def _with_local_soil(soil_class: object, folder: Path) -> object:
+    soil = soil_class.get("soil") if isinstance(soil_class, dict) else None
+    if not isinstance(soil_class, dict) or not isinstance(soil, str):
+        return soil_class
+    beside = folder / soil
+    return soil_class | {"soil": str(beside)} if beside.is_file() else soil_class
 
 
 def _with_local_dem(spec: TerrainSpec, folder: Path) -> TerrainSpec:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from lpet_sim.errors import BlockedPlaceError, PlanningError, UnknownNameError
+from lpet_sim.soil.load import load_soil
 from lpet_sim.sweep.traverse import TraverseSpec, planned_drive
 from lpet_sim.terrain.terrain import build_terrain
 
@@ -59,3 +60,11 @@ def test_a_blocked_waypoint_is_answered_with_the_ways_out_and_an_unreachable_one
         refused[error.type] = str(error.value)
     assert "move_within_m" in refused[BlockedPlaceError]
     assert "move_within_m" not in refused[PlanningError]
+
+
+def test_a_soil_file_of_an_inline_terrain_is_found_beside_the_traverse(tmp_path: Path) -> None:
+    """As the terrain's own file would be."""
+    mine = load_soil("duricrust").model_copy(update={"name": "mine"})
+    mine.to_yaml(tmp_path / "mine.yaml")
+    spec = _traverse(tmp_path, "{soils: [{name: all of it, soil: mine.yaml}]}")
+    assert spec.terrain.soils[0].soil == mine

@@ -120,3 +120,11 @@ def test_a_box_is_closed_below_and_open_above() -> None:
     assert box.grown(1.0) == Box(-1.0, -1.0, 3.0, 2.0)
     with pytest.raises(SpecError, match="must exceed"):
         Box(1.0, 0.0, 1.0, 1.0)
+
+
+def test_a_soil_of_your_own_is_found_beside_the_terrain_that_names_it(tmp_path: Path) -> None:
+    """The file lies beside the terrain's, wherever the command is run."""
+    mine = load_soil("duricrust").model_copy(update={"name": "mine"})
+    mine.to_yaml(tmp_path / "mine.yaml")
+    (tmp_path / "ground.yaml").write_text("soils:\n  - {name: all of it, soil: mine.yaml}\n")
+    assert load_terrain_spec(tmp_path / "ground.yaml").soils[0].soil == mine
