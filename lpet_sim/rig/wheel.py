@@ -189,6 +189,7 @@ def curve_of_table(spec: WheelRigSpec, table: SlipTable) -> WheelCurve:
     slip, ratio = np.array(spec.slip), traction_ratios()
     value = table.value[_NOMINAL, :, 0]
     drawbar = _back(slip, 1 - value[:, ADVANCE], ratio)
+    drawbar[np.abs(drawbar) > table.friction[_NOMINAL]] = np.nan  # there the wheel slides
     return WheelCurve(
         spec=spec,
         slip=slip,

@@ -17,7 +17,7 @@ from lpet_sim.soil.measured_wheels import PredictionError
 _COLOUR: Final = "#D55E00"
 _SIDE_COLOUR: Final = "#0072B2"
 _MARKERS: Final = ("^", "v", "P", "X")
-_EVERY: Final = 4  # points from one marker of the curve to the next
+_MARKED: Final = (2, 4)  # first marked point of the curve, and points to the next: whole tenths
 
 
 def plot_wheel(curve: WheelCurve, measured: Sequence[WheelMeasurements] = ()) -> Figure:
@@ -49,6 +49,7 @@ def plot_wheel(curve: WheelCurve, measured: Sequence[WheelMeasurements] = ()) ->
     pull.set_ylabel("drawbar pull / load")
     angle.set_ylabel("traction angle\n[deg]")
     sinkage.set_ylabel("sinkage [mm]")
+    sinkage.set_ylim(0.0, max(sinkage.get_ylim()[1], 1.0))
     torque.set_ylabel("ratio")
     torque.set_xlabel("slip 1 - v / (r ω), and below 0 skid r ω / v - 1 [%]")
     _finish(figure, curve, (pull, angle, sinkage, torque))
@@ -59,7 +60,7 @@ def _draw(
     axes: Axes, curve: WheelCurve, y: Array, colour: str = _COLOUR, label: str = "law"
 ) -> None:
     slip = 100 * slip_scale(curve.slip)
-    axes.plot(slip, y, "o-", color=colour, lw=1.5, ms=4, markevery=_EVERY, label=label)
+    axes.plot(slip, y, "o-", color=colour, lw=1.5, ms=4, markevery=_MARKED, label=label)
 
 
 def _band(

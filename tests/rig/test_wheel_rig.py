@@ -85,6 +85,7 @@ def test_the_csv_of_a_wheel_has_units_and_empty_cells_where_nothing_is_known(
     )
     known = np.isfinite(curve.drawbar_ratio)
     assert [row["drawbar_over_load"] != "" for row in rows] == known.tolist()
+    assert 0 < known.sum() < len(known)
     angle = [float(row["traction_angle_deg"]) for row in rows if row["traction_angle_deg"]]
     np.testing.assert_allclose(np.radians(angle), curve.traction_angle_rad[known], atol=1e-5)
 
