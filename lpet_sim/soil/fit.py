@@ -34,6 +34,12 @@ STARTS: Final = (
     (3e5, 1.5e6),
     (-0.2, -0.6),
 )
+AXLE_LOADS: Final = (0.863, 1.087, 1.050)
+"""Loads of front, middle and rear axle over their mean on level ground: as measured on the tilt
+bed's rover (the exomars model). MGRU3's are not published: that they are alike is an assumption."""
+AXLE_SHIFTS: Final = (-1.35, 0.30, 1.05)
+"""What each unit of the slope's tangent adds to them; measured there too, from 10 to 20 deg."""
+
 _SCALE: Final = (0.1, 0.5, 1.0, 0.5)  # of the fitted values as the solver sees them
 _POWER: Final = 4  # of a residual that is squared again: near the least greatest error
 _EXCESS_SLOPE: Final = 10.0
@@ -74,18 +80,29 @@ class SoilFit:
 
 
 def climb(soil: MechanicalSoilSpec, wheel: ReferenceWheelSpec, slope_rad: Array) -> Climb:
-    """Find the slip at which a wheel climbs: on the branch on which traction rises with slip.
+    """Find the slip at which a rover climbs: on the branch on which traction rises with slip.
+
+    The wheels of all axles turn at one rate, so that they slip alike, each under its own load
+    (`AXLE_LOADS`, `AXLE_SHIFTS`); together they pull ``tan(slope)`` times the load of all.
 
     Args:
         soil: The soil.
-        wheel: The wheel, its load on level ground and its gravity.
+        wheel: The wheel, its mean load on level ground and its gravity.
         slope_rad: Slopes, Shape (n,).
     """
-    load = wheel.load_n * np.cos(slope_rad)[:, None]
-    pull = wheel_forces(soil, wheel, _GRID, 0.0, load, wheel.gravity_mps2).drawbar_n / load
+    level = wheel.load_n * np.cos(slope_rad)
+    load = (axle_shares(slope_rad) * level[:, None])[..., None]
+    pulls = wheel_forces(soil, wheel, _GRID, 0.0, load, wheel.gravity_mps2).drawbar_n
+    pull = pulls.sum(axis=1) / load.sum(axis=1)
     found = [_on_rise(row, x) for row, x in zip(pull, np.tan(slope_rad), strict=True)]
     most = pull.max(axis=1)
     return Climb(np.array(found), np.tan(slope_rad) <= most, most)
+
+
+def axle_shares(slope_rad: Array) -> Array:
+    """Give the load of each axle over the mean of all, Shape (n, 3); none is lifted off."""
+    shares = AXLE_LOADS + np.tan(slope_rad)[:, None] * AXLE_SHIFTS
+    return np.maximum(shares, 0.05)
 
 
 def _on_rise(pull: Array, wanted: float) -> float:

@@ -16,8 +16,8 @@ from lpet_sim.recording.arrays import Array
 RATIO_MAX: Final = 1.0
 RATIO_NODES: Final = 513
 SIDE_NODES: Final = 33
-LOAD_NODES: Final = 7
-LOAD_SPAN: Final = 8.0  # from the nominal load over this to the nominal load times this
+LOAD_NODES: Final = 9
+LOAD_SPAN: Final = 4.0  # from the nominal load over this to the nominal load times this
 
 ADVANCE, SIDE_CREEP, SINKAGE, TORQUE = range(4)
 

@@ -55,13 +55,13 @@ def test_the_fit_keeps_its_promise_up_to_20_deg() -> None:
         assert abs(without - measured) >= error - 0.05
 
 
-def test_a_climbing_wheel_pulls_what_the_slope_asks() -> None:
-    """At the slip that is found, the law's drawbar pull over load is ``tan(slope)``."""
+def test_a_climbing_rover_pulls_what_the_slope_asks() -> None:
+    """At the slip that is found, all axles pull ``tan(slope)`` of their load together."""
     slope, wheel = np.radians([0.0, 5.0, 12.0, 18.0]), load_wheel("mgru3")
-    slip = climb(fitted_soil(), wheel, slope).slip
-    load = wheel.load_n * np.cos(slope)
-    forces = wheel_forces(fitted_soil(), wheel, slip, 0.0, load, wheel.gravity_mps2)
-    np.testing.assert_allclose(forces.drawbar_n / load, np.tan(slope), atol=0.003)
+    slip = climb(fitted_soil(), wheel, slope).slip[:, None]
+    load = fit.axle_shares(slope) * (wheel.load_n * np.cos(slope))[:, None]
+    pull = wheel_forces(fitted_soil(), wheel, slip, 0.0, load, wheel.gravity_mps2).drawbar_n
+    np.testing.assert_allclose(pull.sum(1) / load.sum(1), np.tan(slope), atol=0.003)
 
 
 def test_the_fit_finds_the_soil_that_made_a_curve(monkeypatch: pytest.MonkeyPatch) -> None:
