@@ -74,8 +74,8 @@ def markdown(rows: list[Row], soil: MechanicalSoilSpec, quick: bool) -> str:
         "# Loose GRC-1, fitted",
         "",
         f"`{COMMAND}{' --quick' if quick else ''}`; wheel `mgru3` on axles loaded as those of the "
-        "tilt bed's rover, Earth gravity; fitted to the points up to 20 deg. Left out: the slip that a fit to the other points up to 20 deg "
-        "predicts.",
+        "tilt bed's rover, Earth gravity; fitted to the points up to 20 deg. Left out: the slip "
+        "that a fit to the other points up to 20 deg predicts.",
         "",
         "| slope [deg] | measured [%] | fitted [%] | error [points] | to claim | left out [%] "
         "| its error |",
