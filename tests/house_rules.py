@@ -7,10 +7,12 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from lpet_sim.kernel_cache import MARK
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("lpet_sim", "estimators")
 
-FOUNDATION = {"errors", "rng", "spec", "datasets", "outputs", "progress"}
+FOUNDATION = {"errors", "rng", "spec", "datasets", "outputs", "progress", "kernel_cache"}
 PHYSICAL = {"soil", "terrain", "rover", "sensors", "planning", "rig"}
 MAY_IMPORT: dict[str, set[str]] = {
     "foundation": set(),
@@ -179,6 +181,41 @@ def covariance_breaks(path: str, text: str) -> list[str]:
         names = (ast.unparse(target).split("[")[0].split(".")[-1] for target in written)
         found += [f"{path}:{node.lineno} writes {x}" for x in names if COVARIANCE.match(x)]
     return found
+
+
+def kernel_breaks(path: str, text: str) -> list[str]:
+    """Find names in compiled code from a file that does not mark itself as a part of it."""
+    tree = ast.parse(text)
+    origin = {
+        alias.asname or alias.name: node.module.replace(".", "/")
+        for node in tree.body
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in PACKAGES
+        for alias in node.names
+        if node.module
+    }
+    kernels = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+        and any(MARK in ast.unparse(d) for d in node.decorator_list)
+    ]
+    used = {
+        (n.lineno, n.id)
+        for k in kernels
+        for part in k.body
+        for n in ast.walk(part)
+        if isinstance(n, ast.Name)
+    }
+    return [
+        f"{path}:{line} compiles {name}, whose file has no word '{MARK}'"
+        for line, name in sorted(used)
+        if name in origin and not _has_part_in_kernels(origin[name], name)
+    ]
+
+
+def _has_part_in_kernels(module: str, name: str) -> bool:
+    files = (ROOT / f"{module}.py", ROOT / module / "__init__.py", ROOT / module / f"{name}.py")
+    return any(MARK in file.read_text() for file in files if file.exists())
 
 
 def body_lengths(text: str) -> dict[tuple[int, str], int]:

@@ -12,6 +12,7 @@ from tests import house_rules as rules
 
 Rule = Callable[[str, str], list[str]]
 
+KERNEL = "from lpet_sim.rng import stream\n@njit(cache=True)\ndef f():\n    return stream"
 BREAKS: list[tuple[Rule, str, str]] = [
     (rules.import_order_breaks, "lpet_sim/terrain/x.py", "from lpet_sim.rover.scene import Scene"),
     (rules.import_order_breaks, "lpet_sim/recording/x.py", "import lpet_sim.evaluation.errors"),
@@ -34,6 +35,7 @@ BREAKS: list[tuple[Rule, str, str]] = [
     (rules.name_breaks, "lpet_sim/utils.py", ""),
     (rules.seed_breaks, "lpet_sim/x.py", "class A(Spec):\n    seed: int = 0"),
     (rules.quaternion_breaks, "lpet_sim/x.py", "from scipy.spatial.transform import Rotation"),
+    (rules.kernel_breaks, "lpet_sim/x.py", KERNEL),
     (rules.covariance_breaks, "estimators/x.py", "P[:3, :3] = 0"),
     (rules.covariance_breaks, "estimators/x.py", "self.covariance -= K @ H"),
 ]

@@ -13,6 +13,7 @@ import numpy as np
 
 from lpet_sim.recording.arrays import Array
 
+# These numbers are frozen into @njit code.
 RATIO_MAX: Final = 1.0
 RATIO_NODES: Final = 513
 SIDE_NODES: Final = 33
