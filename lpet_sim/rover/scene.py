@@ -26,6 +26,8 @@ from lpet_sim.rover.wheel_soil import WheelSoilLaw, WheelState
 _REACH_M = 1.25  # farthest part of a wheel from the body's origin, with room to spare
 _ROCK_MARGIN_M = 1.0  # rocks are found by their centre; the largest reach this far
 _LIFT_STEP_M = 0.01
+# Sweeps that take creep out of contacts: to hold slip to half a point, and to park for hours.
+_SWEEPS_DRIVING, _SWEEPS_PARKED = 1, 6
 
 
 class Scene:
@@ -121,6 +123,8 @@ class Scene:
         self._act[:] = np.clip(self._act, angle - self._drive_reach, angle + self._drive_reach)
         self._ctrl[self._steer_act] = steer_rad
         self._ctrl[self._drive_act] = rate_radps
+        driving = np.any(rate_radps)
+        self.model.opt.noslip_iterations = _SWEEPS_DRIVING if driving else _SWEEPS_PARKED
 
     def hold(self, held: bool) -> None:
         """Begin or end a forced slip: the wheels' surfaces stand still while the wheels turn."""
@@ -174,6 +178,7 @@ class Scene:
         state = np.empty(mujoco.mj_stateSize(self.model, kind))
         mujoco.mj_getState(self.model, self.data, state, kind)
         mujoco.mj_setState(model, data, state, kind)
+        model.opt.noslip_iterations = self.model.opt.noslip_iterations
         for name in ("sensordata", "xpos", "xquat", "qfrc_constraint"):
             getattr(data, name)[:] = getattr(self.data, name)
         for wheel in WHEELS:
