@@ -32,6 +32,9 @@ bench: opengl
 	$(BIN)/python -m benchmarks
 
 experiments: opengl
+	$(BIN)/python -m scenarios.grc1_fit --out docs/results
+	$(BIN)/python -m scenarios.soil_slopes
+	$(BIN)/python -m scenarios.rough_ground
 	$(BIN)/python -m scenarios.experiments
 
 lock: ## needs uv

@@ -100,6 +100,26 @@ def test_the_fitted_soil_is_set_beside_what_was_measured(tmp_path: Path) -> None
     assert [row["slip_fitted_percent"] for row in rows[5:]] == ["cannot climb"] * 2
 
 
+def test_soils_on_the_tilt_bed_give_slip_drift_and_the_table_again(tmp_path: Path) -> None:
+    """Steeper is more slip and more drift, and the measured table comes back."""
+    printed = run_quick("soil_slopes.py", tmp_path, "--out", str(tmp_path), "--workers", "1")
+    assert "| yes |" in printed and "| no |" not in printed
+    found = re.search(r"Greatest difference: ([0-9.]+) points", printed)
+    assert found is not None and float(found[1]) < 1.0
+
+
+def test_rough_ground_is_driven_measured_and_drawn(tmp_path: Path) -> None:
+    """Every part has its row, energy is lost and never made, and the parked rover stays."""
+    printed = run_quick("rough_ground.py", tmp_path, "--out", str(tmp_path), "--workers", "1")
+    table, _, parked, picture = written_by(printed)
+    assert [row["dt_ms"] for row in csv.DictReader(table.read_text().splitlines())] == ["5", "2.5"]
+    least = re.search(r"^\| rocks \| (-?[0-9.]+) \| [0-9.]+ \|$", printed, re.MULTILINE)
+    assert least is not None and float(least[1]) > 0
+    moved = re.findall(r"\| (?:up|down|across) \| ([0-9.]+) \|", parked.read_text())
+    assert len(moved) == 3 and all(float(mm) < 0.1 for mm in moved)
+    assert picture.stat().st_size > 10_000
+
+
 @pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.stem)
 def test_a_scenario_file_is_a_traverse(path: Path) -> None:
     """It loads, is called what its file is called, and goes to YAML and back unchanged."""

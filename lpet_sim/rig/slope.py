@@ -125,18 +125,23 @@ def slopes_with_measured(soil: SoilSpec) -> tuple[float, ...]:
 
 
 def run_slope_rig(
-    spec: SlopeSpec, folder: Path, workers: int = 2, progress: Progress = silent
+    spec: SlopeSpec,
+    folder: Path,
+    workers: int = 2,
+    progress: Progress = silent,
+    keep: bool = False,
 ) -> SlopeReport:
     """Drive every slope and heading of a spec.
 
     Each point is kept in the folder as it ends, so that a run that was killed goes on where it
-    was; they are removed when all are there.
+    was; they are removed when all are there, unless they are to be kept.
 
     Args:
         spec: What to run.
         folder: Where to keep the points.
         workers: How many processes share the work; 1 for this one alone.
         progress: Called with the fraction done.
+        keep: Whether to leave the points, so that the same run again is done at once.
 
     Raises:
         UnknownNameError: There is no such rover.
@@ -149,7 +154,8 @@ def run_slope_rig(
     for key, point in track(_drive_all(spec, missing, workers), max(len(missing), 1), progress):
         found[key] = point
         _keep(kept, point)
-    rmtree(kept.parent, ignore_errors=True)
+    if not keep:
+        rmtree(kept.parent, ignore_errors=True)
     return SlopeReport(spec, tuple(found[key] for key in wanted))
 
 
