@@ -132,14 +132,14 @@ def test_wheel_slip_accounts_for_the_distance_that_odometry_reads_too_much(drive
 
 
 def test_at_a_stop_the_body_rests(driven: Driven) -> None:
-    """From 2 s after the halt: less than 0.1 mm/s and 0.1 mrad/s, and wheels that stand."""
+    """From 3 s after the halt: less than 0.1 mm/s and 0.1 mrad/s, and wheels that stand."""
     t = driven.body("t_ns") / 1e9
     begin = driven.events["stop"]
-    rest = (t > begin + 2) & (t < begin + 8)
+    rest = (t > begin + 3) & (t < begin + 8)
     assert np.abs(driven.body("v_world_body_mps")[rest]).max() < 1e-4
     assert np.abs(driven.body("omega_body_radps")[rest]).max() < 1e-4
     tw = driven.wheels("t_ns") / 1e9
-    rest_w = (tw > begin + 2) & (tw < begin + 8)
+    rest_w = (tw > begin + 3) & (tw < begin + 8)
     np.testing.assert_array_equal(driven.wheels("slip")[rest_w], 0.0)
     assert np.all(driven.wheels("contact")[rest_w] >= CONTACT_SOIL)
 

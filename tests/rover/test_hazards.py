@@ -139,7 +139,7 @@ def test_on_a_slope_beyond_the_soil_the_rover_slides_back(ends_on: tuple[str, ..
     failures = FailureSpec(ends_on=ends_on, sliding_window_s=2.0)
     outcome = drive_over(STEEP, failures=failures, time_limit_s=5.0)
     assert outcome.of("sliding")
-    assert outcome.position[-1, 0] < outcome.position[0, 0] - 0.05
+    assert outcome.position[-1, 0] < outcome.position[0, 0] - 0.02
     assert outcome.ending.kind == ("sliding" if ends_on else "time_limit")
 
 
@@ -215,7 +215,7 @@ def test_entrapment_holds_its_limit_and_its_time(monkeypatch: pytest.MonkeyPatch
 
 def test_a_rover_digs_itself_in_on_a_slope_of_loose_soil_and_not_on_the_flat() -> None:
     """On 19 deg of Mars regolith slip digs the wheels in beyond half their radius."""
-    slope = drive_over(Waves(slope_x=0.35, spec=REGOLITH), time_limit_s=20.0)
+    slope = drive_over(Waves(slope_x=0.35, spec=REGOLITH), time_limit_s=120.0)
     assert slope.ending.kind == "entrapped"
     assert slope.wheels("sinkage_m").max() > 0.1425 / 2
     assert slope.wheels("sinkage_m")[0].max() < 0.03
