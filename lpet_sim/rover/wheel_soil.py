@@ -16,11 +16,11 @@ from typing import Annotated, Protocol
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from lpet_sim.errors import SpecError
 from lpet_sim.recording.arrays import Array, Ints
-from lpet_sim.soil.load import load_soil
+from lpet_sim.soil.load import NamedSoil, load_soil
 from lpet_sim.soil.slip_table import (
     ADVANCE,
     LOAD_NODES,
@@ -106,10 +106,6 @@ class WheelSoilLaw(Protocol):
         ...
 
 
-def _named(soil: object) -> object:
-    return load_soil(soil) if isinstance(soil, str) else soil
-
-
 class WheelSoilSpec(Spec):
     """How wheels follow the law of the soil under them; the soils are the terrain's.
 
@@ -122,7 +118,8 @@ class WheelSoilSpec(Spec):
         law_load_n: Load of that wheel at which the law is computed, standing for an equal share of
             the rover's weight; None for that share itself.
         law_gravity_mps2: Gravity for which the law is computed; None for the model's.
-        rock: The soil that stands for a rock; the name of one of the library is looked up.
+        rock: The soil that stands for a rock; in a file also the name of a soil of the library, or
+            the path of a soil's YAML file.
         sinks: Whether wheels stand as deep as they sink; if not the depth is recorded only.
         sinking_length: Distance rolled over the wheel's radius in which the depth follows the law.
             An assumption: about half of a wheel's contact has then been renewed.
@@ -133,9 +130,7 @@ class WheelSoilSpec(Spec):
     wheel: WheelSpec | None = None
     law_load_n: Positive | None = None
     law_gravity_mps2: NotNegative | None = None
-    rock: Annotated[SoilSpec, BeforeValidator(_named)] = Field(
-        default_factory=partial(load_soil, "rock")
-    )
+    rock: NamedSoil = Field(default_factory=partial(load_soil, "rock"))
     sinks: bool = True
     sinking_length: Annotated[float, Field(ge=0.05, le=5.0)] = 0.5
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from typing import Annotated
 
-from lpet_sim.errors import UnknownNameError
+from pydantic import BeforeValidator
+
+from lpet_sim.errors import LpetError, UnknownNameError
 from lpet_sim.soil.published import PublishedCurve, ReferenceWheelSpec
 from lpet_sim.soil.spec import SoilSpec
 from lpet_sim.spec import Spec, read_yaml
@@ -40,6 +43,34 @@ def load_soil(name_or_path: str | Path) -> SoilSpec:
     """
     path = _find("soil", name_or_path, LIBRARY)
     return _SoilFile.from_mapping({"soil": read_yaml(path)}, source=str(path)).soil
+
+
+def _soil_by_name(soil: object) -> object:
+    """Put a soil in place of its name, so that a manifest holds every number."""
+    try:
+        return load_soil(soil) if isinstance(soil, str) else soil
+    except LpetError as error:
+        raise ValueError(str(error)) from None
+
+
+NamedSoil = Annotated[SoilSpec, BeforeValidator(_soil_by_name)]
+"""A soil's numbers; in a file also the name of one of the library, or the path of a YAML file."""
+
+
+def soil_beside(soil: object, folder: Path) -> object:
+    """Give the path of a soil's file in a folder, if that is what a text names.
+
+    As in `load_soil` the library goes first: a file that is called as one of its soils is not
+    taken.
+
+    Args:
+        soil: What stands for a soil in a file; all but the name of a file there comes back as it
+            is.
+        folder: Where relative paths begin.
+    """
+    if not isinstance(soil, str) or soil in soil_names():
+        return soil
+    return str(folder / soil) if (folder / soil).is_file() else soil
 
 
 def load_wheel(name_or_path: str | Path) -> ReferenceWheelSpec:
