@@ -118,13 +118,13 @@ class _Drive:
 
     def chunks(self) -> Iterator[Truth]:
         """Settle, then step until the drive ends; every chunk begins with a row of the body."""
-        self._settle()
         self._note("start", 0.0, f"sets out on {self._follower.length_m:.1f} m")
+        self._settle()
         while True:
             if self._step and self._step % self._ticks.chunk == 0:
                 yield self._take()
             self._sample()
-            if self._step % self._ticks.control == 0:
+            if not self._ended and self._step % self._ticks.control == 0:
                 self._control()
             if not self._ended:
                 self._advance()
@@ -133,13 +133,16 @@ class _Drive:
                 return
 
     def _advance(self) -> None:
-        """Step; where MuJoCo gave up and reset its state, which turns back its clock, end."""
+        if self._has_stepped():
+            self._step += 1
+        else:
+            self._end("unstable", f"the physics became unstable {self._place}")
+
+    def _has_stepped(self) -> bool:
+        """Step; tell whether MuJoCo did not give up and reset, which turns back its clock."""
         before_s = self._scene.data.time
         self._scene.step()
-        if self._scene.data.time <= before_s:
-            self._end("unstable", f"the physics became unstable {self._place}")
-        else:
-            self._step += 1
+        return bool(self._scene.data.time > before_s)
 
     def _take(self) -> Truth:
         self._log.events = list(in_order(self._log.events))
@@ -148,7 +151,9 @@ class _Drive:
     def _settle(self) -> None:
         self._scene.command(np.zeros(6), np.zeros(6))
         for _ in range(round(self._spec.settle_s / self._scene.spec.physics_dt_s)):
-            self._scene.step()
+            if not self._has_stepped():
+                self._end("unstable", "the physics became unstable before the drive")
+                return
 
     def _sample(self) -> None:
         t_ns = self._step * self._dt_ns

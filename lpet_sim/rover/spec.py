@@ -92,8 +92,8 @@ class FailureSpec(Spec):
     All numbers but half a wheel radius are assumptions.
 
     Attributes:
-        ends_on: Kinds that end the drive. ``tipped`` always does, listed or not: what follows is
-            no physics, since the model's deck and mast do not collide.
+        ends_on: Kinds that end the drive. ``tipped`` always does, listed or not, since the model's
+            deck and mast do not collide; so does ``off_ground``, where there is no more ground.
         tip_angle_rad: ``tipped``: the body's tilt is beyond this.
         sinkage_limit_m: ``entrapped``: a wheel stands deeper in the soil; None for half a radius.
         sinkage_hold_s: For at least this long, so that a bump does not count.

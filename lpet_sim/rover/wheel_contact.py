@@ -14,6 +14,7 @@ from lpet_sim.rover.ground import Ground
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.rover.wheel_forces import follow_forces, move_wheels, read_wheels
 from lpet_sim.rover.wheel_soil import (
+    DEEPEST,
     WheelResponse,
     WheelSoilLaw,
     WheelSoilSpec,
@@ -22,7 +23,7 @@ from lpet_sim.rover.wheel_soil import (
 )
 from lpet_sim.soil.spec import WheelSpec
 
-_LOOK_S = 0.1  # soil and normals are looked up again after this; a rover rolls 3 mm meanwhile
+_LOOK_S = 0.1  # soil and normals are looked up again after this: 3 mm at 100 m/h
 _CROSS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
 
 
@@ -92,7 +93,7 @@ class WheelContact:
             zero[:] = 0.0
         told.load_n[:] = self._mean[2] = load_n
         self.law.respond(self.wheels, self.response)
-        self.motion[2] = self.response.sinkage_m
+        self.motion[2] = np.minimum(self.response.sinkage_m, DEEPEST * self._radius_m)
         return float(self._pace[5] * self.motion[2].mean())
 
     def bind(self, model: Any, data: Any, index: WheelIndex) -> None:

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from lpet_sim.recording.arrays import Array, Ints
-from lpet_sim.rover.wheel_soil import STANDING_RADPS
+from lpet_sim.rover.wheel_soil import DEEPEST, STANDING_RADPS
 
 GEOM, BODY, DOF = range(3)
 
@@ -148,9 +148,9 @@ def move_wheels(
 
     The surface turns back so that the axle advances at ``v = r omega (1 - slip)``, and drifts at
     ``r |omega| creep``; neither jumps. The wheel stands with a radius of ``r - z``, whose depth z
-    follows the law with the distance rolled, and at rest yields but never rebounds. Traction T has
-    the arm ``r - z``; what the law's torque M has more, less what the load N does by sinking,
-    brakes the wheel::
+    follows the law with the distance rolled, and at rest yields but never rebounds, down to
+    `DEEPEST`. Traction T has the arm ``r - z``; what the law's torque M has more, less what the
+    load N does by sinking, brakes the wheel::
 
         M - T (r - z) - N dz / (|omega| dt),  M no less than T r (1 - slip): no energy is made
 
@@ -185,7 +185,7 @@ def move_wheels(
         rise = 0.0
         if force[2, i] > _AIRBORNE_N and not held:
             rolled = 0.0 if turning < STANDING_RADPS else radius * turning * dt
-            rise = _sink(motion[2], i, sinkage_m[i], rolled, dt, length)
+            rise = _sink(motion[2], i, min(sinkage_m[i], DEEPEST * radius), rolled, dt, length)
         stand = radius - sinks * motion[2, i]
         arm[i] = stand - margin / 2  # MuJoCo puts contacts in the middle of the gap
         surfacevel[geom, 2] = -motion[1, i] * radius * turning

@@ -35,10 +35,14 @@ from lpet_sim.soil.slip_table import (
 )
 from lpet_sim.soil.spec import NotNegative, Positive, SoilSpec, WheelSpec
 from lpet_sim.soil.tabulate import tabulate
+from lpet_sim.soil.wheel_law import rolling_radius
 from lpet_sim.spec import Spec
 
 STANDING_RADPS = 1e-3
 """A wheel that turns slower than this stands: its soil bears its load and nothing is sheared."""
+
+DEEPEST = 0.8
+"""Deepest that a wheel stands, over its radius: then its axle nearly drags. An assumption."""
 
 _MIN_LOAD_N = 1.0
 _NODES_PER_LOG = (LOAD_NODES - 1) / (2 * math.log(LOAD_SPAN))
@@ -204,8 +208,9 @@ def tabulated_law(
     of = spec.wheel or wheel
     law_load_n = spec.law_load_n or load_n
     law_gravity = gravity_mps2 if spec.law_gravity_mps2 is None else spec.law_gravity_mps2
+    size = wheel.radius_m / rolling_radius(of)
     tables = [
-        _scaled(tabulate(soil, of, law_load_n, law_gravity), load_n, wheel.radius_m / of.radius_m)
+        _scaled(tabulate(soil, of, law_load_n, law_gravity), load_n, size)
         for soil in [*soils, spec.rock]
     ]
     return TabulatedLaw(tables[:-1], tables[-1], wheel.radius_m)

@@ -178,6 +178,24 @@ def test_physics_that_breaks_down_ends_the_drive(
     assert outcome.ending.t_ns / NS_PER_S == pytest.approx(outcome.t_s[-1], abs=0.1)
 
 
+def test_physics_that_breaks_down_while_it_settles_ends_the_drive_at_once(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Nothing is driven from where MuJoCo put the rover back to."""
+    monkeypatch.chdir(tmp_path)
+    step = Scene.step
+
+    def step_and_break(scene: Scene) -> None:
+        if scene.step_count == 50:
+            scene.data.qvel[3] = 1e12
+        step(scene)
+
+    monkeypatch.setattr(Scene, "step", step_and_break)
+    outcome = drive_over(Waves(amplitude_m=0.01))
+    assert [event.kind for event in outcome.events] == ["start", "unstable"]
+    assert "before the drive" in outcome.ending.text
+
+
 def _sinking(monkeypatch: pytest.MonkeyPatch, begin_m: float, length_m: float) -> None:
     """Let the middle left wheel stand 9 cm deep along a piece of the way."""
 

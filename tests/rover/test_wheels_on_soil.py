@@ -8,8 +8,18 @@ import pytest
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rover.mjcf import WHEELS
 from lpet_sim.rover.spec import RoverSpec
-from lpet_sim.rover.wheel_soil import WheelSoilSpec
+from lpet_sim.rover.wheel_soil import (
+    DEEPEST,
+    WheelResponse,
+    WheelSoilSpec,
+    WheelState,
+    tabulated_law,
+)
+from lpet_sim.soil.load import load_soil
+from lpet_sim.soil.spec import ModulusSpec, WheelSpec
+from lpet_sim.terrain.spec import SoilClass, TerrainSpec
 from tests.rover.drives import (
+    RADIUS_M,
     Way,
     measure,
     mechanical_energy_j,
@@ -205,3 +215,29 @@ def test_halving_the_step_does_not_change_the_slip() -> None:
         roll(scene, 2.0, 0.1)
         slip.append(1 - measure(scene, 30.0, 0.1).ahead)
     assert slip[1] == pytest.approx(slip[0], abs=0.002)
+
+
+def test_on_soil_that_bears_nothing_wheels_sink_no_deeper_than_near_their_axles() -> None:
+    """The rover comes to rest on it: no wheel's radius runs out, and no load is thrown about."""
+    soft = load_soil("mars_sand").model_copy(update={"pressure": ModulusSpec(k=1e3)})
+    spec = TerrainSpec(soils=(SoilClass(name="mush", soil=soft),))
+    scene = start(Waves(spec=spec))
+    assert scene.sinkage_m == pytest.approx(DEEPEST * RADIUS_M)
+    roll(scene, 2.0, SPEED_MPS)
+    assert scene.sinkage_m.max() <= DEEPEST * RADIUS_M + 1e-12
+    assert scene.contact.read()[2].sum() == pytest.approx(WEIGHT_N, rel=0.05)
+
+
+def test_a_grousered_wheels_law_sinks_in_proportion_to_its_tips() -> None:
+    """Slip and sinkage of a law are those of the tips' circle, not of the rim's."""
+    soil, share_n = load_soil("cmu_sand"), WEIGHT_N / 6
+    rover = WheelSpec(radius_m=0.1425, width_m=0.12)
+    tall = WheelSpec(radius_m=0.1, width_m=0.12, grouser_height_m=0.0425, grouser_count=16)
+    depths = []
+    for wheel in (rover, tall):
+        law = tabulated_law(WheelSoilSpec(wheel=wheel), [soil], rover, share_n, 3.721)
+        told, answer = WheelState(), WheelResponse()
+        told.load_n[:] = share_n
+        law.respond(told, answer)
+        depths.append(answer.sinkage_m[0])
+    assert depths[1] == pytest.approx(depths[0], rel=1e-6)
