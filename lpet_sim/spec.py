@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Self, get_args
+from typing import TYPE_CHECKING, Any, Final, Self, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from lpet_sim.errors import SpecError
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
+_NO_MAPPING: Final = ("model_type", "model_attributes_type", "dict_type")
 
 
 class Spec(BaseModel):
@@ -72,14 +77,21 @@ def _first_problem(cls: type[BaseModel], error: ValidationError) -> str:
     if problem["type"] == "extra_forbidden":
         return f"unknown key '{where}'; valid keys are {', '.join(owner.model_fields)}"
     if problem["type"] == "union_tag_not_found":
-        kinds = sorted({str(tag) for model in inside for tag in _tags(model) - {model.__name__}})
-        return f"'{where}' lacks {problem['ctx']['discriminator']}: one of {', '.join(kinds)}"
-    given = f", got {problem['input']!r}" if _is_short(problem["input"]) else ""
-    return f"'{where or 'spec'}': {problem['msg']}{given}"
+        key = problem["ctx"]["discriminator"]
+        kinds = sorted({tag for model in inside for tag in _literals(model, key.strip("'"))})
+        return f"'{where}' lacks {key}: one of {', '.join(kinds)}"
+    if problem["type"] == "value_error":
+        return (f"'{where}': " if where else "") + str(problem["ctx"]["error"])
+    if problem["type"] in _NO_MAPPING:
+        return f"'{where or 'spec'}': must be a mapping of keys to values{_given(problem)}"
+    return f"'{where or 'spec'}': {problem['msg']}{_given(problem)}"
 
 
-def _is_short(value: object) -> bool:
-    return isinstance(value, int | float | str | bool) or value is None
+def _given(problem: ErrorDetails) -> str:
+    """Give the tail that shows the value, if it is short."""
+    value = problem["input"]
+    short = isinstance(value, int | float | str | bool) or value is None
+    return f", got {value!r}" if short else ""
 
 
 def _follow(
@@ -107,10 +119,15 @@ def _follow(
     return owner, inside, ".".join(keys)
 
 
-def _tags(model: type[BaseModel]) -> set[object]:
+def _tags(model: type[BaseModel]) -> set[str]:
     """Give what pydantic may call a member of a union: its name, or a literal that tells it."""
-    literals = (get_args(field.annotation) for field in model.model_fields.values())
-    return {model.__name__, *(tag for tags in literals for tag in tags if isinstance(tag, str))}
+    return {model.__name__}.union(*(_literals(model, key) for key in model.model_fields))
+
+
+def _literals(model: type[BaseModel], key: str) -> set[str]:
+    field = model.model_fields.get(key)
+    tags = get_args(field.annotation) if field is not None else ()
+    return {tag for tag in tags if isinstance(tag, str)}
 
 
 def _models_in(annotation: object) -> list[type[BaseModel]]:

@@ -1,10 +1,10 @@
 """Specs: frozen, to YAML and back, and every mistake in one clear sentence."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
 import pytest
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from lpet_sim.errors import SpecError
 from lpet_sim.spec import Spec
@@ -21,6 +21,13 @@ class Box(Spec):
 
     kind: Literal["box"] = "box"
     edge_m: float = 1.0
+    finish: Literal["matt", "bright"] = "matt"
+
+    @model_validator(mode="after")
+    def _small(self) -> Self:
+        if self.edge_m > 9.0:
+            raise ValueError("edge_m must be at most 9: it does not fit")
+        return self
 
 
 class Ball(Spec):
@@ -91,6 +98,22 @@ def test_a_value_of_the_wrong_type_and_one_that_is_not_finite_are_refused() -> N
     assert "finite" in _sentence({"lens": {"focal_px": float("inf")}})
     assert "'box', 'ball'" in _sentence({"shape": {"kind": "cone"}})
     assert "'shape' lacks 'kind': one of ball, box" in _sentence({"shape": {}})
+
+
+def test_a_refusal_of_our_own_is_told_in_its_own_words() -> None:
+    """Behind the key that it is about, without what the library puts around it."""
+    sentence = _sentence({"shape": {"kind": "box", "edge_m": 10.0}})
+    assert sentence == "device.yaml: 'shape': edge_m must be at most 9: it does not fit"
+    with pytest.raises(SpecError, match=r"^box\.yaml: edge_m must be at most 9: it does not fit$"):
+        Box.from_mapping({"edge_m": 10.0}, source="box.yaml")
+
+
+def test_a_value_in_place_of_a_mapping_is_told_in_plain_words() -> None:
+    """A nested spec, a member of a union, the whole."""
+    expected = "must be a mapping of keys to values"
+    assert _sentence({"lens": 3}) == f"device.yaml: 'lens': {expected}, got 3"
+    assert _sentence({"shape": "box"}) == f"device.yaml: 'shape': {expected}, got 'box'"
+    assert _sentence([1]) == f"device.yaml: 'spec': {expected}"
 
 
 def test_a_file_that_holds_no_mapping_is_refused(tmp_path: Path) -> None:
