@@ -39,7 +39,9 @@ class BekkerSpec(Spec):
 
     Attributes:
         kind: "bekker".
-        kc: Cohesive modulus [N/m^(n+1)].
+        kc: Cohesive modulus [N/m^(n+1)]; published ones are below 0 now and then, which holds for
+            wheels that are wide enough: the law refuses one for which ``kc / b + kphi`` is not
+            above 0.
         kphi: Frictional modulus [N/m^(n+2)].
 
     Reference:
@@ -158,6 +160,24 @@ class MechanicalSoilSpec(_NamedSoil):
             raise ValueError(
                 "peak_angle + peak_angle_slip must be below 1: the peak lies in contact"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _rear_inside(self) -> Self:
+        if self.rear_angle + self.rear_angle_slip < -1.0:
+            raise ValueError(
+                "rear_angle + rear_angle_slip must be at least -1: soil rises behind the wheel no "
+                "higher than before it"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _pressure_rises(self) -> Self:
+        for key in ("sinkage_exponent_slip", "sinkage_exponent_skid"):
+            if self.sinkage_exponent + getattr(self, key) <= 0.0:
+                raise ValueError(
+                    f"sinkage_exponent + {key} must be above 0: pressure rises with depth"
+                )
         return self
 
 

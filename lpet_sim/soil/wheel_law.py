@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lpet_sim.errors import SpecError
 from lpet_sim.recording.arrays import Array
 from lpet_sim.soil.spec import BekkerSpec, MechanicalSoilSpec, ReeceSpec, WheelSpec
 from lpet_sim.soil.stress_kernels import (
@@ -101,7 +102,11 @@ def wheel_forces(
 
 
 def law_of(soil: MechanicalSoilSpec, wheel: WheelSpec, gravity_mps2: float) -> Law:
-    """Gather the numbers that the stresses need."""
+    """Gather the numbers that the stresses need.
+
+    Raises:
+        SpecError: The soil's pressure modulus is not above 0 for this wheel and this gravity.
+    """
     pressure, depth_unit = _pressure(soil, wheel.width_m, gravity_mps2)
     linear, square = flank_coefficients(soil, gravity_mps2)
     return Law(
@@ -142,13 +147,20 @@ def rolling_radius(wheel: WheelSpec) -> float:
 
 def _pressure(soil: MechanicalSoilSpec, width_m: float, gravity_mps2: float) -> tuple[float, float]:
     """Give the pressure at a unit of depth [Pa], and that unit [m]."""
-    form = soil.pressure
+    form, depth_unit = soil.pressure, 1.0
     if isinstance(form, BekkerSpec):
-        return form.kc / width_m + form.kphi, 1.0
-    if isinstance(form, ReeceSpec):
+        pressure = form.kc / width_m + form.kphi
+    elif isinstance(form, ReeceSpec):
         weight = soil.density_kgpm3 * gravity_mps2 * width_m
-        return soil.cohesion_pa * form.kc + weight * form.kphi, width_m
-    return form.k, 1.0
+        pressure, depth_unit = soil.cohesion_pa * form.kc + weight * form.kphi, width_m
+    else:
+        pressure = form.k
+    if pressure <= 0.0:
+        raise SpecError(
+            f"'{soil.name}' bears no wheel of width {width_m:g} m at {gravity_mps2:g} m/s2: its "
+            f"pressure modulus is {pressure:g} and must be above 0"
+        )
+    return pressure, depth_unit
 
 
 def flank_coefficients(soil: MechanicalSoilSpec, gravity_mps2: float) -> tuple[float, float]:

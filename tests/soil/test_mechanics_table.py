@@ -8,7 +8,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from lpet_sim.recording.arrays import Array
 from lpet_sim.soil.load import load_soil
-from lpet_sim.soil.mechanics_table import BACKWARDS, DROP_RATIO
+from lpet_sim.soil.mechanics_table import BACKWARDS, DROP_RATIO, mechanics_table
 from lpet_sim.soil.slip_table import (
     ADVANCE,
     LOAD_NODES,
@@ -95,3 +95,20 @@ def test_a_wheel_that_digs_in_is_as_deep_as_the_law_says(name: str) -> None:
     spinning = wheel_forces(soil_of(name), WHEEL, 1.0, 0.0, LOAD_N, MARS_MPS2)
     deep = looked_up(table_of(name), np.array([0.6]), np.zeros(1))[0, SINKAGE]
     assert deep == pytest.approx(float(spinning.sinkage_m), rel=1e-6)
+
+
+@pytest.mark.parametrize("modulus", [1e3, 3e4])
+def test_a_soil_that_does_not_carry_the_wheel_still_gives_a_sane_table(modulus: float) -> None:
+    """Under all loads or some: finite, slip rises with traction, sunk to the axle at most."""
+    pressure = {"kind": "modulus", "k": modulus}
+    mud = MechanicalSoilSpec.model_validate(
+        soil_of("cmu_sand").model_dump() | {"pressure": pressure}
+    )
+    carried = wheel_forces(mud, WHEEL, 0.2, 0.0, load_nodes(LOAD_N), MARS_MPS2).carried
+    assert not carried[-1]
+    table = mechanics_table(mud, WHEEL, LOAD_N, MARS_MPS2)
+    assert np.isfinite(table.value).all() and np.isfinite(table.friction).all()
+    assert (np.diff(table.value[..., ADVANCE], axis=1) <= 1e-9).all()
+    sinkage = table.value[..., SINKAGE]
+    assert sinkage.min() >= 0.0 and sinkage.max() <= WHEEL.radius_m * (1 + 1e-12)
+    assert (table.friction > 0.0).all()

@@ -32,6 +32,9 @@ BAD_SAND: list[tuple[dict[str, object], str]] = [
     ({"pressure": {"kind": "reece", "kc": 1.0, "kphi": 2.0, "k": 1.0}}, "keys are kind, kc, kphi"),
     ({"evidence": "hearsay"}, "'measured', 'published', 'fitted' or 'assumed'"),
     ({"source": ""}, "source"),
+    ({"sinkage_exponent_slip": -1.0, "sinkage_exponent": 1.0}, "exponent_slip must be above 0"),
+    ({"sinkage_exponent_skid": -1.0, "sinkage_exponent": 0.5}, "exponent_skid must be above 0"),
+    ({"rear_angle": -0.6, "rear_angle_slip": -0.5}, "must be at least -1"),
 ]
 BAD_ROCK: list[tuple[dict[str, object], str]] = [
     ({"friction": 1.2}, "less than 1"),
@@ -100,6 +103,13 @@ def test_a_bad_soil_is_answered_by_a_sentence(
     path.write_text(yaml.safe_dump(mapping))
     with pytest.raises(SpecError, match=rf"soil\.yaml.*{sentence}"):
         load_soil(path)
+
+
+def test_a_soil_without_a_kind_is_told_the_kinds_alone(tmp_path: Path) -> None:
+    """Not the words that other keys take."""
+    (tmp_path / "soil.yaml").write_text("name: mine\nevidence: fitted\n")
+    with pytest.raises(SpecError, match=r"lacks 'kind': one of firm, mechanics, table$"):
+        load_soil(tmp_path / "soil.yaml")
 
 
 def test_an_unknown_name_lists_the_valid_ones() -> None:

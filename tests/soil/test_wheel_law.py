@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from lpet_sim.errors import SpecError
 from lpet_sim.soil.load import load_soil
 from lpet_sim.soil.spec import MechanicalSoilSpec, WheelSpec
 from lpet_sim.soil.stress_kernels import SUMS, VERTICAL, forces_into, motion_of, shear_stress
@@ -254,3 +255,20 @@ def test_a_load_that_the_soil_does_not_carry_is_said() -> None:
     forces = wheel_forces(soil_of("cmu_sand"), WHEEL, 0.2, 0.0, [LOAD_N, 1e5], MARS_MPS2)
     assert forces.carried.tolist() == [True, False]
     assert forces.sinkage_m[1] == pytest.approx(WHEEL.radius_m)
+
+
+@pytest.mark.parametrize(
+    ("changed", "width_m", "gravity_mps2", "sentence"),
+    [
+        ({"pressure": {"kind": "bekker", "kc": -2e5, "kphi": 1e6}}, 0.12, 3.71, "width 0.12 m"),
+        ({"pressure": {"kind": "reece", "kc": 1, "kphi": 1}, "cohesion_pa": 0}, 0.3, 0.0, "0 m/s2"),
+    ],
+)
+def test_a_soil_that_presses_back_nowhere_is_refused(
+    changed: dict[str, object], width_m: float, gravity_mps2: float, sentence: str
+) -> None:
+    """A cohesive modulus below 0 is, for a wheel too narrow, and sand is without its weight."""
+    wheel = WheelSpec(radius_m=0.1425, width_m=width_m)
+    with pytest.raises(SpecError, match=sentence):
+        law_of(soil_of("cmu_sand", **changed), wheel, gravity_mps2)
+    law_of(soil_of("cmu_sand", **changed), WheelSpec(radius_m=0.1425, width_m=0.5), 3.71)
