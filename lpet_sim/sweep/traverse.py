@@ -15,6 +15,7 @@ from lpet_sim.planning.route import nearest_clear, plan_route_over
 from lpet_sim.recording.recording import Manifest
 from lpet_sim.rover.spec import DriveSpec, RoverSpec
 from lpet_sim.sensors.suite import SensorSuiteSpec
+from lpet_sim.soil.load import soil_beside
 from lpet_sim.spec import Spec, read_yaml
 from lpet_sim.terrain.load import load_terrain_spec, with_local_soils
 from lpet_sim.terrain.spec import TerrainSpec
@@ -81,12 +82,15 @@ class TraverseSpec(Spec):
     def from_yaml(cls, path: Path | str) -> Self:
         """Read the traverse from a YAML file; files of terrain and soils may lie beside it.
 
+        That holds for the soil that stands for rocks (``rover.wheel_soil.rock``) too.
+
         Raises:
             SpecError: The file is missing, is not YAML, or holds an unknown key or a bad value.
         """
-        mapping = read_yaml(Path(path))
+        mapping, folder = read_yaml(Path(path)), Path(path).parent
         if isinstance(mapping, dict) and "terrain" in mapping:
-            mapping |= {"terrain": _beside(mapping["terrain"], Path(path).parent)}
+            mapping |= {"terrain": _beside(mapping["terrain"], folder)}
+        _find_rock(mapping, folder)
         return cls.from_mapping(mapping, source=str(path))
 
 
@@ -94,6 +98,15 @@ def _beside(terrain: object, folder: Path) -> object:
     if not isinstance(terrain, str):
         return with_local_soils(terrain, folder)
     return str(folder / terrain) if (folder / terrain).is_file() else terrain
+
+
+def _find_rock(mapping: object, folder: Path) -> None:
+    """Put the path of the soil that stands for rocks, if it is a file in the folder, in place."""
+    inner = mapping
+    for key in ("rover", "wheel_soil"):
+        inner = inner.get(key) if isinstance(inner, dict) else None
+    if isinstance(inner, dict) and "rock" in inner:
+        inner["rock"] = soil_beside(inner["rock"], folder)
 
 
 def planned_drive(spec: TraverseSpec, terrain: Terrain, seed: int) -> DriveSpec:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from lpet_sim.errors import UnknownNameError
+from lpet_sim.soil.load import soil_beside
 from lpet_sim.spec import read_yaml
 from lpet_sim.terrain.spec import TerrainSpec
 
@@ -54,11 +55,9 @@ def with_local_soils(mapping: object, folder: Path) -> object:
 
 
 def _with_local_soil(soil_class: object, folder: Path) -> object:
-    soil = soil_class.get("soil") if isinstance(soil_class, dict) else None
-    if not isinstance(soil_class, dict) or not isinstance(soil, str):
+    if not isinstance(soil_class, dict) or "soil" not in soil_class:
         return soil_class
-    beside = folder / soil
-    return soil_class | {"soil": str(beside)} if beside.is_file() else soil_class
+    return soil_class | {"soil": soil_beside(soil_class["soil"], folder)}
 
 
 def _with_local_dem(spec: TerrainSpec, folder: Path) -> TerrainSpec:

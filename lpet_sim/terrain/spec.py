@@ -7,13 +7,13 @@ figures to hold a result against.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Annotated, Final, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from lpet_sim.errors import LpetError
-from lpet_sim.soil.load import load_soil
-from lpet_sim.soil.spec import FirmSoilSpec, SoilSpec
+from lpet_sim.soil.load import NamedSoil, load_soil
+from lpet_sim.soil.spec import FirmSoilSpec
 from lpet_sim.spec import Spec
 from lpet_sim.terrain.rock_spec import (
     Fraction,
@@ -90,14 +90,6 @@ class CraterSpec(Spec):
         return self
 
 
-def _soil_by_name(soil: object) -> object:
-    """Put a soil of the library in place of its name, so that a manifest holds every number."""
-    try:
-        return load_soil(soil) if isinstance(soil, str) else soil
-    except LpetError as error:
-        raise ValueError(str(error)) from None
-
-
 class SoilClass(Spec):
     """One kind of ground.
 
@@ -111,9 +103,7 @@ class SoilClass(Spec):
 
     name: Annotated[str, Field(min_length=1)]
     area_fraction: Fraction = 1.0
-    soil: Annotated[SoilSpec, BeforeValidator(_soil_by_name)] = Field(
-        default_factory=lambda: load_soil(DEFAULT_SOIL)
-    )
+    soil: NamedSoil = Field(default_factory=partial(load_soil, DEFAULT_SOIL))
     tone: Annotated[float, Field(gt=0.0, le=3.0)] = 1.0
 
     @property

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lpet_sim.errors import BlockedPlaceError, PlanningError, UnknownNameError
+from lpet_sim.errors import BlockedPlaceError, PlanningError, SpecError, UnknownNameError
 from lpet_sim.soil.load import load_soil
 from lpet_sim.sweep.traverse import TraverseSpec, planned_drive
 from lpet_sim.terrain.terrain import build_terrain
@@ -68,3 +68,15 @@ def test_a_soil_file_of_an_inline_terrain_is_found_beside_the_traverse(tmp_path:
     mine.to_yaml(tmp_path / "mine.yaml")
     spec = _traverse(tmp_path, "{soils: [{name: all of it, soil: mine.yaml}]}")
     assert spec.terrain.soils[0].soil == mine
+
+
+def test_the_soil_of_rocks_is_found_beside_the_traverse(tmp_path: Path) -> None:
+    """As those of the terrain are; a name that is neither is told with its key."""
+    mine = load_soil("duricrust").model_copy(update={"name": "mine"})
+    mine.to_yaml(tmp_path / "mine.yaml")
+    rock = "{name: inline}\nrover: {wheel_soil: {rock: %s}}"
+    wheels = _traverse(tmp_path, rock % "mine.yaml").rover.wheel_soil
+    assert wheels is not None
+    assert wheels.rock == mine
+    with pytest.raises(SpecError, match=r"'rover\.wheel_soil\.rock': unknown soil 'jelly': choose"):
+        _traverse(tmp_path, rock % "jelly")

@@ -128,3 +128,10 @@ def test_a_soil_of_your_own_is_found_beside_the_terrain_that_names_it(tmp_path: 
     mine.to_yaml(tmp_path / "mine.yaml")
     (tmp_path / "ground.yaml").write_text("soils:\n  - {name: all of it, soil: mine.yaml}\n")
     assert load_terrain_spec(tmp_path / "ground.yaml").soils[0].soil == mine
+
+
+def test_a_file_that_is_called_as_a_soil_of_the_library_is_not_taken(tmp_path: Path) -> None:
+    """The library goes first wherever a soil is named."""
+    load_soil("duricrust").to_yaml(tmp_path / "bedrock")
+    (tmp_path / "ground.yaml").write_text("soils:\n  - {name: all of it, soil: bedrock}\n")
+    assert load_terrain_spec(tmp_path / "ground.yaml").soils[0].soil == load_soil("bedrock")
