@@ -8,7 +8,6 @@ import numpy as np
 
 from lpet_sim.evaluation.attribution import FORCED_SLIP
 from lpet_sim.evaluation.slip_onset import SlipFound, SlipReport
-from lpet_sim.evaluation.slip_series import SlipSeriesSpec
 from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.trajectory import Trajectory
@@ -25,12 +24,14 @@ class SlipMatch:
         lost_true_m: Motion by the wheels less true motion, over the event if there is one, else
             over what was found [m].
         interval_s: Time between the images where it began, or their usual one if it was missed [s].
+        min_step_m: Least motion by the wheels of which a slip was told [m].
     """
 
     event: Event | None
     found: SlipFound | None
     lost_true_m: float
     interval_s: float
+    min_step_m: float
 
     @property
     def late_s(self) -> float | None:
@@ -47,7 +48,7 @@ class SlipMatch:
     @property
     def harmless(self) -> bool:
         """Whether the event cost less motion than slip can be told of, as in a point turn."""
-        return self.event is not None and self.lost_true_m < SlipSeriesSpec().min_step_m
+        return self.event is not None and self.lost_true_m < self.min_step_m
 
     @property
     def text(self) -> str:
@@ -88,17 +89,17 @@ def match_slips(report: SlipReport, truth: Truth, wheels: Estimate) -> tuple[Sli
         One match for each forced slip and each slip found besides, in order of time.
     """
     interval_ns = round(float(np.median(report.series.t_ns - report.series.begin_ns)))
-    left = list(report.found)
+    left, least = list(report.found), report.spec.series.min_step_m
     matches = []
     for event in (e for e in truth.events if e.kind == FORCED_SLIP):
         found = next((f for f in left if _overlap(f, event, interval_ns)), None)
         if found is not None:
             left.remove(found)
         lost = _lost_m(wheels.trajectory, truth.trajectory, event.t_ns, _end_ns(event))
-        matches.append(SlipMatch(event, found, lost, _interval_s(found, interval_ns)))
+        matches.append(SlipMatch(event, found, lost, _interval_s(found, interval_ns), least))
     for found in left:
         lost = _lost_m(wheels.trajectory, truth.trajectory, found.onset_ns, found.end_ns)
-        matches.append(SlipMatch(None, found, lost, _interval_s(found, interval_ns)))
+        matches.append(SlipMatch(None, found, lost, _interval_s(found, interval_ns), least))
     return tuple(sorted(matches, key=_time_ns))
 
 

@@ -67,10 +67,12 @@ class SlipReport:
     Attributes:
         series: Slip between the images.
         found: The slips that raised the alarm, in order of time.
+        spec: When the alarm was to be raised, and how slip was measured.
     """
 
     series: SlipSeries
     found: tuple[SlipFound, ...]
+    spec: SlipOnsetSpec
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ def find_slip(
             grown = _grow(series, window, taken, spec)
             taken[grown[0] : grown[1] + 1] = True
             found.append(_summary(series, window, grown))
-    return SlipReport(series, tuple(sorted(found, key=lambda f: f.onset_ns)))
+    return SlipReport(series, tuple(sorted(found, key=lambda f: f.onset_ns)), spec)
 
 
 def _alarms(

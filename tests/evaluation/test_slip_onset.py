@@ -9,7 +9,7 @@ from scipy.stats import norm
 from lpet_sim.errors import RecordingError
 from lpet_sim.evaluation.slip_match import match_slips
 from lpet_sim.evaluation.slip_onset import SlipOnsetSpec, SlipReport, find_slip
-from lpet_sim.evaluation.slip_series import STEP_SIGMA, slip_series
+from lpet_sim.evaluation.slip_series import STEP_SIGMA, SlipSeriesSpec, slip_series
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import NS_PER_S
 from lpet_sim.recording.calibration import WheelCalibration
@@ -195,6 +195,18 @@ def test_an_event_that_is_not_there_is_not_matched() -> None:
     matches = match_slips(report, _truth(path, _event(500.0)), wheels)
     assert [match.within_one_image for match in matches] == [False, False]
     assert [match.event is None for match in matches] == [True, False]
+
+
+@pytest.mark.parametrize(("least_m", "harmless"), [(0.02, False), (0.2, True)])
+def test_a_slip_is_harmless_by_the_least_step_that_it_was_looked_for_with(
+    least_m: float, harmless: bool
+) -> None:
+    """The forced slip loses 0.139 m."""
+    vision, wheels, path = _drive(_forced(300.0))
+    spec = SlipOnsetSpec(series=SlipSeriesSpec(min_step_m=least_m))
+    report = find_slip(vision, wheels, WHEELS, spec)
+    match = match_slips(report, _truth(path, _event(300.0)), wheels)[0]
+    assert match.harmless is harmless
 
 
 def test_estimates_that_share_no_images_cannot_be_compared() -> None:

@@ -81,11 +81,11 @@ def test_a_slip_is_told_with_its_delay_and_what_it_cost() -> None:
     times = (300_200_000_000, 305_000_000_000, 306_000_000_000, (298_800_000_000, 302_400_000_000))
     found = SlipFound(*times, lost_m=0.137, slip=0.7, sigmas=5.0)
     matches = [
-        SlipMatch(event, found, 0.139, 3.6),
-        SlipMatch(event, found, 0.139, 0.1),
-        SlipMatch(event, None, 0.139, 3.6),
-        SlipMatch(event, None, -0.001, 3.6),
-        SlipMatch(None, found, 0.139, 3.6),
+        SlipMatch(event, found, 0.139, 3.6, 0.02),
+        SlipMatch(event, found, 0.139, 0.1, 0.02),
+        SlipMatch(event, None, 0.139, 3.6, 0.02),
+        SlipMatch(event, None, -0.001, 3.6, 0.02),
+        SlipMatch(None, found, 0.139, 3.6, 0.02),
     ]
     table = slip_table(matches)
     text = _text(table)
