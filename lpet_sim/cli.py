@@ -20,8 +20,11 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # Rich would take units in brackets for its own marks.
 )
-import_app = typer.Typer(help="Make a recording of a real data set.", no_args_is_help=True)
+import_app = typer.Typer(
+    help="Make a recording of a real data set.", no_args_is_help=True, rich_markup_mode=None
+)
 app.add_typer(import_app, name="import")
 app.add_typer(rig_app, name="rig")
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from lpet_sim.datasets import DataError
 from lpet_sim.recording.arrays import Array
+from lpet_sim.rig.published import is_of_library, is_wheel_of_library
 from lpet_sim.rig.wheel import WheelRigSpec
 from lpet_sim.soil.measured_wheels import (
     PredictionError,
@@ -52,8 +53,11 @@ def measured_beside(spec: WheelRigSpec) -> tuple[WheelMeasurements, ...]:
     """Give what was measured with the rig's wheel on its soil; none where the data are absent.
 
     Args:
-        spec: The rig. Carnegie Mellon's two wheels on their sand are the only ones there are.
+        spec: The rig. Carnegie Mellon's two wheels on their sand are the only ones there are; an
+            altered copy of either, or another load, has nothing beside it.
     """
+    if not (is_of_library(spec.soil) and is_wheel_of_library(spec.wheel)):
+        return ()
     name = _WHEELS.get(spec.wheel.name)
     soil = spec.soil
     if name is None or not isinstance(soil, MechanicalSoilSpec) or soil.name not in _SOILS:

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from lpet_sim.outputs import whole_file
 from lpet_sim.rig.files import write_slope_csv, write_wheel_csv
 from lpet_sim.rig.measured import WheelMeasurements
+from lpet_sim.rig.published import published_beside
 from lpet_sim.rig.slope import SlopeReport
 from lpet_sim.rig.slope_figure import plot_slope
 from lpet_sim.rig.wheel import WheelCurve
 from lpet_sim.rig.wheel_figure import plot_wheel
-from lpet_sim.soil.load import published_curves
 
 _DPI = 150
 
@@ -27,7 +27,7 @@ def write_slope(report: SlopeReport, folder: Path) -> tuple[Path, Path]:
     """
     table, picture = folder / "slope.csv", folder / "slope.png"
     write_slope_csv(report, table)
-    _save(plot_slope(report, published_curves(report.spec.soil.name)), picture)
+    _save(plot_slope(report, published_beside(report.spec.soil)), picture)
     return table, picture
 
 

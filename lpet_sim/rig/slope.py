@@ -7,29 +7,31 @@ import json
 import math
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from shutil import rmtree
 from typing import Annotated, Final
 
-from pydantic import Field, TypeAdapter
+from pydantic import Field, TypeAdapter, ValidationError
 
 import lpet_sim
 from lpet_sim.outputs import output_folder, whole_file
 from lpet_sim.progress import Progress, silent, track
 from lpet_sim.rig.bed import TiltBed
+from lpet_sim.rig.published import published_beside
 from lpet_sim.rig.slope_drive import drive_on_bed
 from lpet_sim.rig.slope_point import Heading, SlopePoint
 from lpet_sim.rover.mjcf import model_path, models_folder
 from lpet_sim.rover.spec import RoverSpec
-from lpet_sim.soil.load import published_curves
 from lpet_sim.soil.published import ReferenceWheelSpec
 from lpet_sim.soil.spec import MeasuredSoilSpec, SoilSpec
 from lpet_sim.spec import Spec
 from lpet_sim.terrain.spec import SoilClass, TerrainSpec
 
 DEFAULT_SLOPES_RAD: Final = tuple(math.radians(deg) for deg in range(0, 31, 5))
+SLOPE_MAX_DEG: Final = 45.0
 HEADINGS: Final[tuple[Heading, ...]] = ("up", "down", "across")
 _SAME_SLOPE_RAD: Final = math.radians(0.25)
 _Key = tuple[float, Heading]
@@ -55,7 +57,8 @@ class SlopeSpec(Spec):
     wheel: ReferenceWheelSpec | None = None
     speed_mps: Annotated[float, Field(gt=0.0, le=0.5)] = 0.05
     slopes_rad: Annotated[
-        tuple[Annotated[float, Field(ge=0.0, le=math.radians(45.0))], ...], Field(min_length=1)
+        tuple[Annotated[float, Field(ge=0.0, le=math.radians(SLOPE_MAX_DEG))], ...],
+        Field(min_length=1),
     ] = DEFAULT_SLOPES_RAD
     headings: Annotated[tuple[Heading, ...], Field(min_length=1)] = HEADINGS
 
@@ -116,7 +119,7 @@ def slopes_with_measured(soil: SoilSpec) -> tuple[float, ...]:
     They are the soil's own where it is a measured curve, else those of the longest published curve.
     A default slope within 0.25 deg of a measured one is left out.
     """
-    published = (curve.slope_rad for curve in published_curves(soil.name))
+    published = (curve.slope_rad for curve in published_beside(soil))
     longest = max(published, key=len, default=())
     measured = soil.slope_rad if isinstance(soil, MeasuredSoilSpec) else longest
     near = [min((abs(d - m) for m in measured), default=1.0) for d in DEFAULT_SLOPES_RAD]
@@ -155,7 +158,7 @@ def run_slope_rig(
         found[key] = point
         _keep(kept, point)
     if not keep:
-        rmtree(kept.parent, ignore_errors=True)
+        _forget(kept)
     return SlopeReport(spec, tuple(found[key] for key in wanted))
 
 
@@ -206,10 +209,18 @@ def _keep(kept: Path, point: SlopePoint) -> None:
 
 
 def _read(kept: Path, key: _Key) -> SlopePoint | None:
-    path = _file(kept, key)
-    if not path.exists():
+    """Give a kept point; one that is damaged is as good as missing, and is driven again."""
+    try:
+        return _POINT.validate_json(_file(kept, key).read_bytes())
+    except (OSError, ValidationError):
         return None
-    return _POINT.validate_json(path.read_bytes())
+
+
+def _forget(kept: Path) -> None:
+    """Remove the points of this run; those of others in the same folder stay."""
+    rmtree(kept, ignore_errors=True)
+    with suppress(OSError):  # it holds the points of others
+        kept.parent.rmdir()
 
 
 def _key(spec: SlopeSpec) -> str:

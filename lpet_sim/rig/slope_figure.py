@@ -56,8 +56,11 @@ def plot_slope(report: SlopeReport, published: Sequence[PublishedCurve] = ()) ->
     rows[2].set_xlabel("slope of the bed [deg]")
     for row in rows:
         row.grid(alpha=0.3)
-    rows[0].plot([], [], "o", color="gray", mfc="white", label="not steady: slides, stalls, tips")
-    rows[0].legend(loc="upper left", fontsize="small")
+    if not all(point.held for point in report.points):
+        words = "not steady: slides, stalls, tips"
+        rows[0].plot([], [], "o", color="gray", mfc="white", label=words)
+    # Above the axes: within them there is no place that every soil's curves leave free.
+    rows[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize="small")
     figure.suptitle(_title(report), fontsize="medium")
     return figure
 

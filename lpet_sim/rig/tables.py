@@ -12,12 +12,13 @@ from rich.text import Text
 
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rig.measured import WheelMeasurements
+from lpet_sim.rig.published import published_beside
 from lpet_sim.rig.slope import SlopeReport
 from lpet_sim.rig.slope_figure import published_label
 from lpet_sim.rig.slope_point import Heading, SlopePoint
 from lpet_sim.rig.wheel import WheelCurve, slip_scale
 from lpet_sim.rover.mjcf import WHEELS
-from lpet_sim.soil.load import load_soil, published_curves, soil_names
+from lpet_sim.soil.load import load_soil, soil_names
 from lpet_sim.soil.published import PublishedCurve
 
 _TITLES: Final[dict[Heading, str]] = {
@@ -36,7 +37,7 @@ def slope_tables(report: SlopeReport) -> Iterator[Table]:
     What others published of this soil has a column going up, with a value where it was measured
     within 0.35 deg of the bed's slope.
     """
-    published = published_curves(report.spec.soil.name)
+    published = published_beside(report.spec.soil)
     for heading in report.spec.headings:
         beside = published if heading == "up" else ()
         yield _slope_table(report, heading, beside)

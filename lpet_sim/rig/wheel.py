@@ -11,17 +11,15 @@ from pydantic import Field
 
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rover.frames import rover_frames
+from lpet_sim.rover.mjcf import model_path
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.soil.published import ReferenceWheelSpec
 from lpet_sim.soil.slip_table import (
     ADVANCE,
     LOAD_NODES,
-    SIDE_CREEP,
-    SIDE_NODES,
     SINKAGE,
     TORQUE,
     SlipTable,
-    side_ratios,
     traction_ratios,
 )
 from lpet_sim.soil.spec import MechanicalSoilSpec, SoilSpec
@@ -29,6 +27,7 @@ from lpet_sim.soil.tabulate import tabulate
 from lpet_sim.soil.wheel_law import rolling_radius, wheel_forces
 from lpet_sim.spec import Spec
 
+SLIP_ANGLE_END_DEG: Final = 80.0  # the slip angle is below it
 _SLIP_SCALE: Final = np.arange(-38, 39) / 40  # -0.95 to 0.95
 _NOMINAL: Final = LOAD_NODES // 2
 
@@ -66,7 +65,9 @@ class WheelRigSpec(Spec):
     soil: SoilSpec
     wheel: ReferenceWheelSpec
     slip: tuple[Annotated[float, Field(ge=-100.0, lt=1.0)], ...] = SLIPS
-    slip_angle_rad: Annotated[float, Field(ge=0.0, lt=math.radians(80.0))] = math.radians(15.0)
+    slip_angle_rad: Annotated[float, Field(ge=0.0, lt=math.radians(SLIP_ANGLE_END_DEG))] = (
+        math.radians(15.0)
+    )
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,8 @@ class WheelCurve:
     Attributes:
         spec: What was asked.
         slip: ``1 - v / (r omega)``; `slip_scale` is for drawing.
-        drawbar_ratio: Drawbar pull over load; nan where the soil's curve does not reach.
+        drawbar_ratio: Drawbar pull over load; like all below it is nan where the soil's curve does
+            not reach, or where the soil does not carry the load.
         torque_ratio: Torque over load and radius.
         sinkage_m: Depth of the lowest point [m].
         side_ratio: Side force over load at the spec's slip angle.
@@ -110,7 +112,7 @@ def rover_wheel(model: str) -> ReferenceWheelSpec:
         source=f"models/{model}.xml",
         radius_m=frames.wheel_radius_m,
         width_m=frames.wheel_width_m,
-        load_n=frames.mass_kg * frames.gravity_mps2 / len(frames.wheel_names),
+        load_n=frames.wheel_share_n,
         gravity_mps2=frames.gravity_mps2,
     )
 
@@ -137,6 +139,7 @@ def wheel_rig_spec(
         UnknownNameError: There is no such rover model.
         SpecError: A value out of its range.
     """
+    model_path(rover)
     of = wheel or rover_wheel(rover)
     test = {"load_n": load_n, "gravity_mps2": gravity_mps2}
     given = {name: value for name, value in test.items() if value is not None}
@@ -172,10 +175,12 @@ def _by_mechanics(spec: WheelRigSpec, soil: MechanicalSoilSpec) -> WheelCurve:
     return WheelCurve(
         spec=spec,
         slip=slip,
-        drawbar_ratio=ahead.drawbar_n / load,
-        torque_ratio=ahead.torque_nm / (load * rolling_radius(wheel)),
-        sinkage_m=ahead.sinkage_m,
-        side_ratio=np.abs(aslant.side_n) / load,
+        drawbar_ratio=np.where(ahead.carried, ahead.drawbar_n / load, np.nan),
+        torque_ratio=np.where(
+            ahead.carried, ahead.torque_nm / (load * rolling_radius(wheel)), np.nan
+        ),
+        sinkage_m=np.where(ahead.carried, ahead.sinkage_m, np.nan),
+        side_ratio=np.where(aslant.carried, np.abs(aslant.side_n) / load, np.nan),
     )
 
 
@@ -196,7 +201,7 @@ def curve_of_table(spec: WheelRigSpec, table: SlipTable) -> WheelCurve:
         drawbar_ratio=drawbar,
         torque_ratio=np.interp(drawbar, ratio, value[:, TORQUE]),
         sinkage_m=np.interp(drawbar, ratio, value[:, SINKAGE]),
-        side_ratio=_side_of_table(slip, spec.slip_angle_rad, table),
+        side_ratio=_side_of_table(spec, table),
     )
 
 
@@ -206,22 +211,22 @@ def _back(wanted: Array, rising: Array, ratio: Array) -> Array:
     return np.interp(wanted, rising[distinct], ratio[distinct], left=np.nan, right=np.nan)
 
 
-def _side_of_table(slip: Array, slip_angle_rad: float, table: SlipTable) -> Array:
-    """Find the side force over load at which a wheel of given slip moves at a slip angle."""
-    ratio, side = traction_ratios(), side_ratios()
-    value = table.value[_NOMINAL]
-    creep = np.empty((len(slip), SIDE_NODES))
-    for j in range(SIDE_NODES):
-        traction = _back(slip, 1 - value[:, j, ADVANCE], ratio)
-        creep[:, j] = np.interp(traction, ratio, value[:, j, SIDE_CREEP])
-    wanted = (1 - slip) * math.tan(slip_angle_rad)
-    return np.array([_first_reach(w, row, side) for w, row in zip(wanted, creep, strict=True)])
+def _side_of_table(spec: WheelRigSpec, table: SlipTable) -> Array:
+    """Find the side force over load at the spec's slip angle, for ground alike in all directions.
 
-
-def _first_reach(wanted: float, creep: Array, side: Array) -> float:
-    """Find the least side force whose creep is the wanted one; nan where none is."""
-    known = np.isfinite(creep)
-    if not known.any() or np.nanmax(creep) < wanted:
-        return math.nan
-    rising = np.maximum.accumulate(creep[known])
-    return float(np.interp(wanted, rising, side[known]))
+    There the force that the ground must give is along the slip, and its size is that which straight
+    rolling needs for as much slip. The soils that only have a table are of this kind; the side
+    force of a mechanical soil is not looked for in its table, and is nan.
+    """
+    slip, value = np.array(spec.slip), table.value[_NOMINAL, :, 0]
+    if isinstance(spec.soil, MechanicalSoilSpec):
+        return np.full(len(slip), np.nan)
+    resistance, advance = spec.soil.rolling_resistance, 1 - slip
+    along = slip / np.maximum(advance, 1.0)
+    across = np.minimum(advance, 1.0) * math.tan(spec.slip_angle_rad)
+    length = np.maximum(np.hypot(along, across), 1e-12)
+    force = _back(length, 1 - value[:, ADVANCE], traction_ratios()) + resistance
+    force = np.maximum(force, 0.0)  # rounded, at no slip
+    drawbar, side = force * along / length - resistance, force * across / length
+    beyond = np.hypot(drawbar, side) > table.friction[_NOMINAL]  # there the wheel slides
+    return np.where(beyond | (advance > value[:, ADVANCE].max()), np.nan, side)

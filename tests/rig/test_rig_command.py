@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lpet_sim.soil.load import soil_names
+from lpet_sim.soil.load import LIBRARY, soil_names
 from tests.command import Ended, Lpet, runner
 
 
@@ -61,7 +61,8 @@ def test_a_missing_or_unknown_soil_lists_those_that_there_are(lpet: Lpet) -> Non
     ("options", "words"),
     [
         (("--slopes", "0,steep"), ("--slopes", "0,10,20")),
-        (("--slopes", "60"), ("slopes_rad", "0.785")),
+        (("--slopes", "60"), ("--slopes 60", "from 0 to 45 degrees")),
+        (("--slopes", "nan"), ("--slopes nan", "from 0 to 45 degrees")),
         (("--speed", "0"), ("speed_mps", "greater than 0")),
         (("--dt", "0.5"), ("physics_dt_s", "0.01")),
         (("--rover", "sojourner"), ("sojourner", "exomars")),
@@ -86,6 +87,43 @@ def test_a_place_that_cannot_be_written_is_refused_before_any_drive(
     (tmp_path / "taken").write_text("")
     ended = lpet("rig", "slope", "--soil", "grc1_loose", "--out", tmp_path / "taken")
     assert_refused(ended, "cannot make the folder")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--slip-angle", "80"), ("--slip-angle 80", "below 80 degrees")),
+        (("--slip-angle", "-5"), ("--slip-angle -5", "0 or more")),
+        (("--rover", "nope"), ("nope", "exomars")),
+        (("--out", "{taken}"), ("cannot make the folder",)),
+    ],
+)
+def test_the_wheel_rig_refuses_bad_input_before_it_prints_anything(
+    lpet: Lpet, tmp_path: Path, options: tuple[str, ...], words: tuple[str, ...]
+) -> None:
+    """The soil brings its own wheel, and the rover's name is checked all the same."""
+    taken = tmp_path / "taken"
+    taken.write_text("")
+    typed = [text.format(taken=taken) for text in options]
+    ended = lpet("rig", "wheel", "--soil", "grc1_loose", "--out", tmp_path / "rig", *typed)
+    assert_refused(ended, *words)
+    assert ended.out == ""
+
+
+def test_a_soil_that_names_no_wheel_there_is_is_itself_to_blame(lpet: Lpet, tmp_path: Path) -> None:
+    """The user gave no wheel; the sentence names the soil and the key in its file."""
+    text = (LIBRARY / "duricrust.yaml").read_text()
+    (tmp_path / "mine.yaml").write_text(f"{text}\nmeasured_with: nosuch\n")
+    ended = lpet("rig", "wheel", "--soil", tmp_path / "mine.yaml", "--out", tmp_path)
+    assert_refused(ended, "duricrust", "measured_with", "'nosuch'", "mgru3")
+
+
+def test_the_help_keeps_the_units(lpet: Lpet) -> None:
+    """Units stand in brackets, which a formatter of the help may take for its own marks."""
+    ended = lpet("rig", "slope", "--help")
+    assert [unit for unit in ("[m/s]", "[s]", "[deg]") if unit not in ended.out] == []
+    assert "[N]" in lpet("rig", "wheel", "--help").out
+    assert "[m]" in lpet("terrain", "--help").out
 
 
 def test_the_library_of_soils_can_be_listed(lpet: Lpet) -> None:

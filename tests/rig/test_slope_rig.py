@@ -1,6 +1,7 @@
 """The slope rig: what it measures on the bed, how it ends, and that it goes on where it was."""
 
 import csv
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from lpet_sim.rig import slope as slope_rig
 from lpet_sim.rig.files import SLOPE_HEADER, write_slope_csv
+from lpet_sim.rig.published import published_beside
 from lpet_sim.rig.slope import (
     SlopeReport,
     SlopeSpec,
@@ -86,10 +88,12 @@ def test_a_slope_beyond_the_soil_is_a_result_and_no_error() -> None:
 
 def test_the_slopes_hold_those_that_were_measured() -> None:
     """A default slope close to a measured one gives way to it."""
-    degrees = np.degrees(slopes_with_measured(load_soil("grc1_loose")))
+    soil = load_soil("grc1_loose")
+    assert soil.kind == "table"
+    degrees = np.degrees(slopes_with_measured(soil))
     assert {0.0, 5.0, 15.0} <= set(degrees.round(6))
     assert not {10.0, 20.0, 25.0, 30.0} & set(degrees.round(6))
-    assert np.degrees(load_soil("grc1_loose").slope_rad) == pytest.approx(
+    assert np.degrees(soil.slope_rad) == pytest.approx(
         [d for d in degrees if round(d, 6) not in (0.0, 5.0, 15.0)]
     )
     plain = np.degrees(slopes_with_measured(load_soil("duricrust")))
@@ -120,6 +124,27 @@ def test_the_figure_draws_what_was_published(report: SlopeReport) -> None:
     labels = [text.get_text() for text in legend.get_texts()]
     assert [f"simulated, {heading}" for heading in ("up", "down", "across")] == labels[:3]
     assert {curve.label for curve in published} <= set(labels)
+    assert [label for label in labels if "not steady" in label] == []
+
+
+def test_the_figure_explains_a_hollow_mark_where_there_is_one(report: SlopeReport) -> None:
+    """One drive that slid has its entry in the legend, which lies off the axes' inside."""
+    slid = dataclasses.replace(report.points[0], ended="slides")
+    figure = plot_slope(SlopeReport(report.spec, (slid, *report.points[1:])))
+    legend = figure.axes[0].get_legend()
+    assert legend is not None
+    assert "not steady" in legend.get_texts()[-1].get_text()
+    figure.draw_without_rendering()
+    assert legend.get_window_extent().y0 >= figure.axes[0].get_window_extent().y1
+
+
+def test_an_altered_copy_of_a_soil_has_no_published_points_beside_it() -> None:
+    """Its name in the library is not enough, and a name that is a file's is none."""
+    soil = load_soil("grc1_loose")
+    assert soil.kind == "table"
+    assert published_beside(soil) == published_curves("grc1_loose") != ()
+    assert published_beside(soil.model_copy(update={"rolling_resistance": 0.3})) == ()
+    assert published_beside(soil.model_copy(update={"name": "mine.yaml"})) == ()
 
 
 def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,4 +170,31 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.M
     report = run_slope_rig(spec, tmp_path, workers=1)
     assert len(driven) == 4
     assert [point.slope_rad for point in report.points] == list(spec.slopes_rad)
+    assert list(tmp_path.rglob("*")) == []
+
+
+def test_points_of_others_stay_and_damaged_ones_are_driven_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run removes its own points alone, and reads no more than whole ones."""
+    driven: list[float] = []
+
+    def drive(spec: SlopeSpec, slope_rad: float, heading: str) -> SlopePoint:
+        driven.append(slope_rad)
+        six = (0.1,) * 6
+        return SlopePoint(slope_rad, "up", "steady", 0.1, 0.0, 0.0, 0.0, 1.0, six, six, six, six)
+
+    monkeypatch.setattr(slope_rig, "drive_point", drive)
+    mine, other = (
+        _spec(1.0, 2.0, speed_mps=speed).model_copy(update={"headings": ("up",)})
+        for speed in (0.1, 0.2)
+    )
+    run_slope_rig(other, tmp_path, workers=1, keep=True)
+    run_slope_rig(mine, tmp_path, workers=1)
+    kept = sorted(tmp_path.rglob("*.json"))
+    assert len(kept) == 2
+    kept[0].write_text('{"slope_rad": 0.0')
+    driven.clear()
+    run_slope_rig(other, tmp_path, workers=1)
+    assert driven == [other.slopes_rad[0]]
     assert list(tmp_path.rglob("*")) == []
