@@ -83,7 +83,9 @@ def _first_problem(cls: type[BaseModel], error: ValidationError) -> str:
     if problem["type"] == "value_error":
         return (f"'{where}': " if where else "") + str(problem["ctx"]["error"])
     if problem["type"] in _NO_MAPPING:
-        return f"'{where or 'spec'}': must be a mapping of keys to values{_given(problem)}"
+        said = f"'{where or 'spec'}': must be a mapping of keys to values{_given(problem)}"
+        keys = inside[0].model_fields if len(inside) == 1 else ()
+        return f"{said}; valid keys are {', '.join(keys)}" if keys else said
     return f"'{where or 'spec'}': {problem['msg']}{_given(problem)}"
 
 
