@@ -168,7 +168,8 @@ def _slip_summary(rows: list[Row]) -> list[str]:
     found = [row for row in forced if "found_late_s" in row]
     lines = ["", "Slip found by comparing frame-to-frame vision with the wheels:", ""]
     in_time = sum(row["found_in_time"] for row in forced)
-    lines.append(f"- forced slip found within one image: {in_time} of {len(forced)} seeds")
+    where = f"{len(forced)} seeds in which it cost 2 cm or more (of {len(rows)})"
+    lines.append(f"- forced slip found within one image: {in_time} of {where}")
     if found:
         lines.append(f"- onset late by [s]: {_spread([row['found_late_s'] for row in found])}")
         lines.append(f"- lost, found [m]: {_spread([row['found_lost_m'] for row in found])}")
