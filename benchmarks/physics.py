@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import mujoco
 
-from benchmarks.timing import Row, Samples
+from benchmarks.timing import Row, Samples, compare_steps
 from lpet_sim.recording.truth import Truth
 from lpet_sim.rover.drive import drive
 from lpet_sim.rover.scene import Scene
@@ -62,13 +62,5 @@ def _result(scene: Scene, pieces: list[Truth], ours: Samples, bare: Samples) -> 
     ours = Samples(ours.wall_s[:full], ours.cpu_s[:full])
     bare = Samples(bare.wall_s[:full], bare.cpu_s[:full])
     steps = CHUNK_S / scene.spec.physics_dt_s
-    row = Row(
-        part="physics, drive loop",
-        ours=steps / ours.median_s,
-        bare=steps / bare.median_s,
-        unit="steps/s",
-        cost=ours.median_s / bare.median_s,
-        cpu_cost=ours.median_cpu_s / bare.median_cpu_s,
-        note=NOTE,
-    )
+    row = compare_steps("physics, drive loop", ours, bare, steps, note=NOTE)
     return PhysicsResult(row, pieces, bare.shared_by(steps))

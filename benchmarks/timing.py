@@ -115,6 +115,22 @@ def compare_ms(part: str, ours: Samples, bare: Samples, aim: str = "-", note: st
     )
 
 
+def compare_steps(
+    part: str, ours: Samples, bare: Samples, steps: float, aim: str = "-", note: str = ""
+) -> Row:
+    """Make a row of two rates, of samples of so many steps each."""
+    return Row(
+        part=part,
+        ours=steps / ours.median_s,
+        bare=steps / bare.median_s,
+        unit="steps/s",
+        cost=ours.median_s / bare.median_s,
+        cpu_cost=ours.median_cpu_s / bare.median_cpu_s,
+        aim=aim,
+        note=note,
+    )
+
+
 def alone_ms(part: str, ours: Samples, note: str = "") -> Row:
     """Make a row of something that has no bare counterpart."""
     return Row(part, 1e3 * ours.median_s, None, "ms", None, note=note)

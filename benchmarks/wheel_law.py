@@ -7,7 +7,7 @@ import copy
 import mujoco
 import numpy as np
 
-from benchmarks.timing import Row, Samples
+from benchmarks.timing import Row, Samples, compare_steps
 from lpet_sim.rig.bed import TiltBed
 from lpet_sim.rover.scene import Scene, build_scene
 from lpet_sim.sweep.simulate import World
@@ -74,14 +74,5 @@ def _step(model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> None:
 
 
 def _row(part: str, where: str, ours: Samples, bare: Samples) -> Row:
-    ours, bare = ours.after(1), bare.after(1)
-    return Row(
-        part=f"wheel-soil {part}, {where}",
-        ours=STEPS / ours.median_s,
-        bare=STEPS / bare.median_s,
-        unit="steps/s",
-        cost=ours.median_s / bare.median_s,
-        cpu_cost=ours.median_cpu_s / bare.median_cpu_s,
-        aim=AIM,
-        note=NOTES[part],
-    )
+    name = f"wheel-soil {part}, {where}"
+    return compare_steps(name, ours.after(1), bare.after(1), STEPS, AIM, NOTES[part])
