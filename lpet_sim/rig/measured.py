@@ -70,7 +70,6 @@ def measured_beside(spec: WheelRigSpec) -> tuple[WheelMeasurements, ...]:
         slip = 1 - rows.speed_mps / (
             rows.rim_mps * rolling_radius(spec.wheel) / spec.wheel.radius_m
         )
-    driving = slip >= 0
     return (
         WheelMeasurements(
             label=f"measured, {name} wheel (Carnegie Mellon)",
@@ -78,7 +77,7 @@ def measured_beside(spec: WheelRigSpec) -> tuple[WheelMeasurements, ...]:
             drawbar_ratio=rows.drawbar_n / rows.load_n,
             sinkage_m=rows.sinkage_m,
             error=prediction_error(rows, soil, spec.wheel),
-            error_driving=prediction_error(rows.only(driving), soil, spec.wheel),
-            error_skidding=prediction_error(rows.only(~driving), soil, spec.wheel),
+            error_driving=prediction_error(rows.only(rows.driving), soil, spec.wheel),
+            error_skidding=prediction_error(rows.only(~rows.driving), soil, spec.wheel),
         ),
     )

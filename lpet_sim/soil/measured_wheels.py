@@ -50,6 +50,11 @@ class MeasuredWheel:
     side_n: Array
     sinkage_m: Array
 
+    @property
+    def driving(self) -> NDArray[np.bool_]:
+        """Which rows were driven at slip 0 or above, as commanded: their own is within 0.01."""
+        return self.slip > -0.01
+
     def only(self, rows: NDArray[np.bool_]) -> MeasuredWheel:
         """Pick rows."""
         return MeasuredWheel(**{name: column[rows] for name, column in vars(self).items()})
