@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from estimators.dead_reckoning import DeadReckoning
-from estimators.frame_to_frame import FrameToFrame
-from estimators.fused_odometry import FusedOdometry
+from estimators.frame_to_frame import FrameToFrame, FrameToFrameSpec
+from estimators.fused_odometry import FusedOdometry, FusedOdometrySpec
+from estimators.motion import MotionSpec
 from estimators.protocol import Estimator
 from lpet_sim.errors import UnknownNameError
+from lpet_sim.spec import Spec
 
-ESTIMATORS: dict[str, Callable[[], Estimator]] = {
-    "dead_reckoning": DeadReckoning,
-    "fused_odometry": FusedOdometry,
-    "frame_to_frame": FrameToFrame,
+ESTIMATORS: dict[str, tuple[type[Spec], Callable[[Any], Estimator]]] = {
+    "dead_reckoning": (MotionSpec, DeadReckoning),
+    "fused_odometry": (FusedOdometrySpec, FusedOdometry),
+    "frame_to_frame": (FrameToFrameSpec, FrameToFrame),
 }
-"""Every estimator by name, as a builder that takes the default spec."""
+"""Every estimator by name: the type of its spec, and what builds it from one."""
 
 
-def build_estimator(name: str) -> Estimator:
-    """Build an estimator with its default spec.
+def build_estimator(name: str, spec: dict[str, Any] | None = None) -> Estimator:
+    """Build an estimator.
 
     Args:
         name: One of `ESTIMATORS`.
+        spec: Fields of its spec as read from YAML; what is not given has its default.
 
     Raises:
         UnknownNameError: No estimator has this name; the sentence lists those there are.
+        SpecError: An unknown key or a bad value.
     """
     if name not in ESTIMATORS:
         raise UnknownNameError("estimator", name, ESTIMATORS)
-    return ESTIMATORS[name]()
+    kind, build = ESTIMATORS[name]
+    return build(kind.from_mapping(spec or {}, source=name))
 
 
 __all__ = ["ESTIMATORS", "Estimator", "build_estimator"]

@@ -35,3 +35,7 @@ class PlanningError(LpetError):
 
 class BlockedPlaceError(PlanningError):
     """A place at which the rover is to stand, but that is not clear."""
+
+
+class BrokenFilterError(LpetError):
+    """A filter whose covariance is no longer positive definite: the run ends here."""

@@ -44,6 +44,27 @@ class WheelStream(ArrayStruct):
 
 
 @dataclass(frozen=True, eq=False)
+class OdometryStream(ArrayStruct):
+    """Motion of the body from one time to the next, as some odometry of its own delivers it.
+
+    Step i leads from ``t_ns[i - 1]`` to ``t_ns[i]``; the first row's step is zero.
+
+    Attributes:
+        t_ns: Times since the start [ns], Shape (n,).
+        twist: ``log(T_prev_curr)``, ``(translation, rotation)`` in the body [m, rad], Shape (n, 6).
+        variance: Declared variance of each part of the right perturbation of ``T_prev_curr``
+            [m^2, rad^2], white from step to step, Shape (n, 6).
+        scale_sigma: Declared relative error of each part, 1 sigma, shared by all steps; the same in
+            every row, Shape (n, 6).
+    """
+
+    t_ns: Ints
+    twist: Array
+    variance: Array
+    scale_sigma: Array
+
+
+@dataclass(frozen=True, eq=False)
 class SightingStream(ArrayStruct):
     """Landmark sightings, ragged: those of image i are rows ``offsets[i]:offsets[i + 1]``.
 
@@ -132,6 +153,7 @@ class Measurements:
         wheels: Encoder readings, None where there are none.
         sightings: Landmark sightings, None until a front end has made them.
         images: The image pairs, None where they were not kept.
+        odometry: Motion increments of a unit of its own, None where there is none.
     """
 
     calibration: Calibration
@@ -139,6 +161,7 @@ class Measurements:
     wheels: WheelStream | None = None
     sightings: SightingStream | None = None
     images: StereoImages | None = None
+    odometry: OdometryStream | None = None
 
     def require(self, *names: str) -> None:
         """Hold the measurements to have the named streams.
@@ -146,7 +169,7 @@ class Measurements:
         Raises:
             RecordingError: A stream is absent.
         """
-        streams = ("imu", "wheels", "sightings", "images")
+        streams = ("imu", "wheels", "odometry", "sightings", "images")
         present = [name for name in streams if getattr(self, name) is not None]
         for name in names:
             if name not in present:

@@ -1,0 +1,130 @@
+"""The variants of the SLAM filter as data: who enters the state, who leaves, and how errors add."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from lpet_sim.spec import Spec
+
+UNLIMITED = 9999
+"""Reads as "no limit" in run names, as in the paper's."""
+
+
+class KeepAll(Spec):
+    """Full SLAM: every landmark enters when it is first seen, and stays."""
+
+    kind: Literal["keep_all"] = "keep_all"
+
+    @property
+    def label(self) -> str:
+        """How run names tell it."""
+        return f"m{UNLIMITED}-n{UNLIMITED}"
+
+
+class TimeToLive(Spec):
+    """Multiframe: every landmark enters when it is first seen, and leaves some images after.
+
+    Attributes:
+        images: The counter M, set whenever the landmark is seen and lowered by one for each image
+            in which it is not; at 0 the landmark leaves.
+    """
+
+    kind: Literal["time_to_live"] = "time_to_live"
+    images: Annotated[int, Field(ge=1)] = 10
+
+    @property
+    def label(self) -> str:
+        """How run names tell it."""
+        return f"m{self.images}-n{UNLIMITED}"
+
+
+class BoundedQueue(Spec):
+    """Bounded state: a landmark waits outside until it is seen again, and the queue holds N.
+
+    Attributes:
+        size: Most landmarks in the queue, N.
+        leave: Who leaves a full queue for the next: the one that came first, the one with the
+            shortest time to live (unseen for longest), or the one whose sighting is predicted least
+            surely.
+        waiting_images: Images after which one that waits unseen is forgotten.
+    """
+
+    kind: Literal["bounded_queue"] = "bounded_queue"
+    size: Annotated[int, Field(ge=1)] = 40
+    leave: Literal["first_in_first_out", "shortest_time_to_live", "least_confidence"] = (
+        "first_in_first_out"
+    )
+    waiting_images: Annotated[int, Field(ge=1)] = 10
+
+    @property
+    def label(self) -> str:
+        """How run names tell it."""
+        short = {"first_in_first_out": "fifo", "shortest_time_to_live": "ttl"}
+        return f"m{UNLIMITED}-n{self.size}-{short.get(self.leave, 'conf')}"
+
+
+Retention = Annotated[KeepAll | TimeToLive | BoundedQueue, Field(discriminator="kind")]
+
+
+class AnchorSpec(Spec):
+    """Landmarks mapped while the rover stands at the start, which tie the map to the world.
+
+    Attributes:
+        count_max: Most anchors.
+        looks_min: Fewest sightings at standstill that make a landmark an anchor.
+        prefer: Which ones are chosen if there are more: the farthest, which stay in view, or those
+            known best by the size of their disparity, the nearest.
+        unseen_images_max: An anchor unseen for longer leaves like any other landmark; None: never.
+    """
+
+    count_max: Annotated[int, Field(ge=1)] = 30
+    looks_min: Annotated[int, Field(ge=2)] = 10
+    prefer: Literal["far", "near"] = "far"
+    unseen_images_max: Annotated[int, Field(ge=1)] | None = None
+
+
+class SlamSpec(Spec):
+    """One EKF-SLAM filter; the paper's algorithms are values of these fields.
+
+    Attributes:
+        retention: Who enters and who leaves: `KeepAll`, `TimeToLive` or `BoundedQueue`.
+        coupling: ``coupled`` keeps the full covariance; ``decoupled`` drops all correlations but
+            those of the pose and of each landmark within themselves after every update;
+            ``decoupled_pose_kept`` drops those between landmarks alone.
+        anchors: Pins landmarks mapped at standstill (the paper's observable form); None does not.
+        formulation: ``standard`` linearises at the latest estimate, ``first_estimates`` at the
+            first one of each pose and landmark, ``right_invariant`` takes errors in the world, with
+            one rotation for pose and map.
+        association_check: Beside the gate of each sighting: ``none``, or ``one_point_ransac``.
+        gate_probability: Share of fitting sightings that pass their chi-square gate.
+        sightings_min: An image with fewer accepted sightings counts as bridged by odometry.
+        noise_scale: Factor on the declared noise of sightings and odometry, 1 sigma; for tests of
+            what a filter makes of wrong noise.
+    """
+
+    retention: Retention = TimeToLive()
+    coupling: Literal["coupled", "decoupled", "decoupled_pose_kept"] = "coupled"
+    anchors: AnchorSpec | None = None
+    formulation: Literal["standard", "first_estimates", "right_invariant"] = "right_invariant"
+    association_check: Literal["none", "one_point_ransac"] = "one_point_ransac"
+    gate_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.999
+    sightings_min: Annotated[int, Field(ge=0)] = 3
+    noise_scale: Annotated[float, Field(gt=0.0)] = 1.0
+
+    @model_validator(mode="after")
+    def _decoupled_in_the_world(self) -> Self:
+        if self.coupling != "coupled" and self.formulation == "right_invariant":
+            raise ValueError(
+                "a decoupled filter drops correlations of errors in world coordinates: its "
+                "formulation must be standard or first_estimates"
+            )
+        return self
+
+    @property
+    def label(self) -> str:
+        """How run names tell the variant, such as ``m10-n9999-coupled-observable-invariant``."""
+        observable = "unobservable" if self.anchors is None else "observable"
+        form = {"standard": "standard", "first_estimates": "fej"}.get(self.formulation, "invariant")
+        return f"{self.retention.label}-{self.coupling}-{observable}-{form}"
