@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from rich.progress import track
 
-from lpet_sim.planning.clearance import RouteSpec
 from lpet_sim.outputs import output_folder
+from lpet_sim.planning.clearance import RouteSpec
 from lpet_sim.rng import stream
 from lpet_sim.rover.spec import DriveSpec, ForcedSlip, Stop
 from lpet_sim.sweep.simulate import simulate
