@@ -17,6 +17,10 @@ class RecordingError(LpetError):
     """A recording that is missing, truncated, of another schema, or lacks a stream."""
 
 
+class RowsError(LpetError):
+    """A table of runs that is missing, cut off, or lacks what is asked of it."""
+
+
 class OutputError(LpetError):
     """A place that cannot be written."""
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.stats import beta
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import beta, binom
 
 from lpet_sim.recording.arrays import Array
 
@@ -45,9 +45,75 @@ def bootstrap(
     """
     x = np.asarray(values, dtype=float)
     resampled = statistic(x[rng.integers(len(x), size=(resamples, len(x)))], axis=-1)
+    return interval_of(statistic(x, axis=-1), resampled, confidence)
+
+
+def interval_of(value: ArrayLike, resampled: ArrayLike, confidence: float = 0.95) -> Interval:
+    """Give a statistic with the percentile interval of its resamples.
+
+    Args:
+        value: The statistic of the runs.
+        resampled: Its values over the resamples, Shape (resamples,); those that are not a number,
+            of resamples that hold no run to speak of, are left out.
+        confidence: Coverage of the interval.
+    """
+    known = np.asarray(resampled, dtype=float)
+    known = known[~np.isnan(known)]
+    if not len(known):
+        return Interval(float(np.asarray(value)), np.nan, np.nan)
     tail = (1 - confidence) / 2
-    low, high = np.quantile(resampled, [tail, 1 - tail])
-    return Interval(float(statistic(x, axis=-1)), float(low), float(high))
+    ends = (float(quantile(known, share)) for share in (tail, 1 - tail))
+    return Interval(float(np.asarray(value)), *ends)
+
+
+def quantile(values: ArrayLike, share: float, in_order: bool = False) -> Array:
+    """Give a quantile by linear interpolation, where values may be infinite.
+
+    A failed run has an infinite error and keeps its place among the others; between two values of
+    which one is infinite lies that infinity, and between the two infinities zero.
+
+    Args:
+        values: Values along the last axis, Shape (..., n).
+        share: Share of the values below it, 0 to 1.
+        in_order: Whether the values are sorted already.
+    """
+    x = np.asarray(values, dtype=float)
+    x = x if in_order else np.sort(x, axis=-1)
+    at = round(share * (x.shape[-1] - 1), 9)
+    low, high = x[..., int(np.floor(at))], x[..., int(np.ceil(at))]
+    with np.errstate(invalid="ignore"):
+        between = low + (high - low) * (at % 1)
+        # Of two equal infinities the difference is no number, of two opposite ones the sum.
+        between = np.where(np.isnan(between) & ~np.isnan(low + high), low, between)
+        opposite = np.isinf(low) & np.isinf(high) & (low != high)
+    return np.where(low == high, low, np.where(opposite, 0.0, between))
+
+
+def rms(values: ArrayLike, axis: int = -1) -> Array:
+    """Give the root mean square of the finite values along an axis; NaN where there are none."""
+    x = np.asarray(values, dtype=float)
+    known = np.isfinite(x)
+    squares = np.where(known, x, 0.0) ** 2
+    count = known.sum(axis=axis)
+    mean = squares.sum(axis=axis) / np.maximum(count, 1)
+    return np.where(count > 0, np.sqrt(mean), np.nan)
+
+
+def draw_runs(runs: int, rng: np.random.Generator, resamples: int = 2000) -> NDArray[np.int64]:
+    """Draw resamples of runs, each in order, so that a sorted array stays sorted under them.
+
+    One set of draws serves many statistics: values indexed by it are resampled together, run by
+    run, as a ratio or a paired difference needs it.
+
+    Args:
+        runs: Number of runs.
+        rng: Generator of the resamples.
+        resamples: Number of resamples.
+
+    Returns:
+        Indices, Shape (resamples, runs).
+    """
+    return np.sort(rng.integers(runs, size=(resamples, runs)), axis=-1)
 
 
 def pass_rate(passes: int, runs: int, confidence: float = 0.95) -> Interval:
@@ -65,6 +131,31 @@ def pass_rate(passes: int, runs: int, confidence: float = 0.95) -> Interval:
     low = 0.0 if passes == 0 else float(beta.ppf(tail, passes, runs - passes + 1))
     high = 1.0 if passes == runs else float(beta.ppf(1 - tail, passes + 1, runs - passes))
     return Interval(passes / runs, low, high)
+
+
+def confidence_of_share(passes: int, runs: int, share: float = 0.95) -> float:
+    """Give the confidence with which at least a share of all runs passes.
+
+    The one-sided level at which the lower Clopper-Pearson end is the share: the chance of fewer
+    passes than were seen if exactly that share passed, ``P(X < passes)``.
+
+    Args:
+        passes: Runs that passed.
+        runs: All runs, failed ones included.
+        share: The share that is to be shown.
+    """
+    return float(binom.cdf(passes - 1, runs, share))
+
+
+def confidence_against_share(passes: int, runs: int, share: float = 0.95) -> float:
+    """Give the confidence with which less than a share of all runs passes, ``P(X > passes)``.
+
+    Args:
+        passes: Runs that passed.
+        runs: All runs, failed ones included.
+        share: The share that is to be refuted.
+    """
+    return float(binom.sf(passes, runs, share))
 
 
 def paired_difference(
