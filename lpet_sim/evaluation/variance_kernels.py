@@ -1,0 +1,136 @@
+"""Compiled sums over tracks for the variances of a sensor, by restricted maximum likelihood.
+
+The residual of a track at a point near its best is ``y = X g + H dq + B b + e``: g are errors that
+all tracks share, dq is the rest of the point's error (unknown), b the landmark's fixed error of
+each coordinate, ``b ~ N(0, theta_3 I)``, and e white noise of variances theta_0, theta_1, theta_2
+of the three coordinates. With ``V = D + theta_3 B B'`` and ``P = V^-1 - V^-1 H (H' V^-1 H)^-1 H'
+V^-1`` the score and the information of the restricted likelihood are ``y' P Q_k P y - tr(P Q_k)``
+and ``tr(P Q_k P Q_l)``, for the four parts Q of V. Because D is diagonal and M = [B H] is thin, P
+is ``D^-1 - D^-1 M C M' D^-1`` with a C of 6x6, so that a track costs what it has rows.
+
+Reference:
+    Patterson and Thompson, Recovery of inter-block information when block sizes are unequal (1971).
+    Henderson, Best linear unbiased estimation and prediction under a selection model (1975).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+@njit(cache=True, nogil=True)
+def _design(H: Array, k: int, m: Array) -> None:
+    """Fill the row of [B H] for coordinate k."""
+    m[:3] = 0.0
+    m[k] = 1.0
+    m[3:] = H[k]
+
+
+@njit(cache=True, nogil=True)
+def _grams(H: Array, fits: Flags, grams: Array) -> int:
+    """Fill the Gram matrix of each coordinate's rows, Shape (3, 6, 6), and give their number."""
+    grams[:] = 0.0
+    m, n = np.empty(6), 0
+    for i in range(len(H)):
+        if fits[i]:
+            n += 1
+            for k in range(3):
+                _design(H[i], k, m)
+                grams[k] += np.outer(m, m)
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _information(grams: Array, n: int, C: Array, theta: Array, F: Array) -> None:
+    """Add a track's information ``tr(P Q_k P Q_l)``, Shape (4, 4)."""
+    total = grams[0] / theta[0] + grams[1] / theta[1] + grams[2] / theta[2]
+    U = (np.eye(6) - total @ C)[:3]
+    for k in range(3):
+        CG = C @ grams[k]
+        F[k, k] += n / theta[k] ** 2 - 2.0 * np.trace(CG) / theta[k] ** 3
+        for other in range(3):
+            cross = np.trace(CG @ C @ grams[other])
+            F[k, other] += cross / (theta[k] * theta[other]) ** 2
+        fixed = np.trace(U @ grams[k] @ U.T) / theta[k] ** 2
+        F[k, 3] += fixed
+        F[3, k] += fixed
+    # A slice of columns is not contiguous, which the matrix product wants.
+    F[3, 3] += np.sum(((U @ total) ** 2)[:, :3])
+
+
+@njit(cache=True, nogil=True)
+def _weighted(
+    residual: Array, H: Array, X: Array, fits: Flags, theta: Array, my: Array, mx: Array
+) -> None:
+    """Fill ``M' D^-1 y``, Shape (6,), and ``M' D^-1 X``, Shape (6, g)."""
+    my[:], mx[:] = 0.0, 0.0
+    m = np.empty(6)
+    for i in range(len(residual)):
+        if fits[i]:
+            for k in range(3):
+                _design(H[i], k, m)
+                my += m * (residual[i, k] / theta[k])
+                mx += np.outer(m, X[i, k]) / theta[k]
+
+
+@njit(cache=True, nogil=True)
+def sum_tracks(
+    starts: Ints,
+    residual: Array,
+    H: Array,
+    X: Array,
+    fits: Flags,
+    theta: Array,
+    F: Array,
+    quadratic: Array,
+    shared: tuple[Array, Array, Array],
+) -> None:
+    """Add up what all tracks with two sightings or more say of variances and shared errors.
+
+    Args:
+        starts: Rows of track j are ``starts[j]:starts[j + 1]``, Shape (k + 1,).
+        residual: Measured less predicted coordinates [px], Shape (m, 3).
+        H: Derivatives by the point, Shape (m, 3, 3).
+        X: Derivatives by the shared errors, Shape (m, 3, g).
+        fits: Rows to use, Shape (m,).
+        theta: Variances of u_left, u_right, v and of the fixed error [px^2], Shape (4,), positive.
+        F: Receives the information of the variances, Shape (4, 4).
+        quadratic: Receives ``y' P Q_k P y``, Shape (4,).
+        shared: Receive ``X' P X`` (g, g), ``X' P y`` (g,) and the sum of the outer products of the
+            tracks' shares of the latter (g, g).
+    """
+    g = X.shape[2]
+    grams, my, mx, m = np.empty((3, 6, 6)), np.empty(6), np.empty((6, g)), np.empty(6)
+    prior = np.zeros((6, 6))
+    for k in range(3):
+        prior[k, k] = 1.0 / theta[3]
+    for j in range(len(starts) - 1):
+        rows = slice(starts[j], starts[j + 1])
+        r, h, x, use = residual[rows], H[rows], X[rows], fits[rows]
+        n = _grams(h, use, grams)
+        if n < 2:
+            continue
+        total = grams[0] / theta[0] + grams[1] / theta[1] + grams[2] / theta[2]
+        C = np.linalg.inv(total + prior)
+        _information(grams, n, C, theta, F)
+        _weighted(r, h, x, use, theta, my, mx)
+        a, score, sums = C @ my, np.zeros(g), np.zeros(3)
+        shared[0][:] -= mx.T @ C @ mx
+        for i in range(len(r)):
+            if use[i]:
+                for k in range(3):
+                    _design(h[i], k, m)
+                    weighted = (r[i, k] - m @ a) / theta[k]
+                    quadratic[k] += weighted**2
+                    sums[k] += weighted
+                    score += x[i, k] * weighted
+                    shared[0][:] += np.outer(x[i, k], x[i, k]) / theta[k]
+        quadratic[3] += np.sum(sums**2)
+        shared[1][:] += score
+        shared[2][:] += np.outer(score, score)
