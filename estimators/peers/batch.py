@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from estimators.odometry_steps import chained
 from estimators.peers.graph import GraphMaker, from_pose3, swapped, to_pose3
 from estimators.peers.inputs import PeerInputs, peer_inputs
 from estimators.peers.library import load_gtsam
@@ -49,11 +50,12 @@ class GtsamBatch:
         inputs = peer_inputs(measurements)
         make, rows = GraphMaker(inputs, self.spec), tracked_rows(inputs, self.spec)
         images = len(inputs.sightings)
-        values = start_values(make, rows)
+        start = start_values(make, rows)
+        values = start
         stages = ["huber"] if self.spec.robust == "geman_mcclure" else []
         try:
             for robust in [*stages, self.spec.robust]:
-                graph = make_graph(make, rows, robust)
+                graph = make_graph(make, rows, start, robust)
                 values, iterations = self._solve(make.gtsam, graph, values)
             covariance = self._covariances(make, graph, values)
         except RuntimeError as error:
@@ -101,26 +103,25 @@ def tracked_rows(inputs: PeerInputs, spec: GtsamBatchSpec) -> Ints:
 
 
 def start_values(make: GraphMaker, rows: Ints) -> Any:
-    """Put the poses where odometry has them, and each landmark where its nearest view does."""
+    """Put the poses where odometry has them, and each landmark where most of its views do."""
     inputs, values = make.inputs, make.gtsam.Values()
-    poses = [inputs.T_world_body_start]
-    for step in range(len(inputs.T_prev_curr)):
-        poses.append(poses[-1] @ inputs.T_prev_curr[step])
-    for image, pose in enumerate(poses):
-        values.insert(make.pose_key(image), to_pose3(pose))
-    best, numbers = nearest_views(inputs, rows)
-    p_world = SE3.stack(poses)[image_of_rows(inputs)[best]] @ inputs.points_in_body(best)
-    for number, point in zip(numbers, p_world, strict=True):
-        values.insert(make.landmark_key(int(number)), point)
+    poses = chained(inputs.odometry, inputs.T_world_body_start)
+    for image in range(len(poses)):
+        values.insert(make.pose_key(image), to_pose3(poses[image]))
+    for number, point in _points(inputs, rows, poses).items():
+        values.insert(make.landmark_key(number), point)
     return values
 
 
-def make_graph(make: GraphMaker, rows: Ints, robust: str) -> Any:
-    """Make the graph of everything."""
+def make_graph(make: GraphMaker, rows: Ints, start: Any, robust: str) -> Any:
+    """Make the graph of everything, with landmarks that enter where they start."""
     graph, inputs = make.gtsam.NonlinearFactorGraph(), make.inputs
     graph.add(make.prior())
     for image in range(1, len(inputs.sightings)):
         graph.add(make.motion(image))
+    for number in np.unique(inputs.sightings.landmark_id[rows]).tolist():
+        key = make.landmark_key(number)
+        graph.add(make.entry(key, start.atPoint3(key)))
     image_of, landmark_id = image_of_rows(inputs), inputs.sightings.landmark_id
     for row in rows.tolist():
         key = make.landmark_key(int(landmark_id[row]))
@@ -128,13 +129,17 @@ def make_graph(make: GraphMaker, rows: Ints, robust: str) -> Any:
     return graph
 
 
-def nearest_views(inputs: PeerInputs, rows: Ints) -> tuple[Ints, Ints]:
-    """Give for each landmark the row of its largest disparity, and its number, Shape (l,)."""
-    px = inputs.sightings.stereo_px[rows]
+def _points(inputs: PeerInputs, rows: Ints, poses: SE3) -> dict[int, Array]:
+    """Give the median of what each landmark's sightings say of its place, false ones or not [m]."""
+    rows = rows[inputs.well_seen(0.0)[rows]]
+    if not len(rows):
+        return {}
+    p_world = poses[image_of_rows(inputs)[rows]] @ inputs.points_in_body(rows)
     number = inputs.sightings.landmark_id[rows]
-    order = np.lexsort((px[:, 1] - px[:, 0], number))
+    order = np.argsort(number, kind="stable")
     numbers, first = np.unique(number[order], return_index=True)
-    return rows[order][first], numbers
+    parts = np.split(p_world[order], first[1:])
+    return {int(n): np.median(p, axis=0) for n, p in zip(numbers, parts, strict=True)}
 
 
 def image_of_rows(inputs: PeerInputs) -> Ints:

@@ -86,7 +86,7 @@ class _Window:
         entering = ~known & self._well_seen[rows]
         used = np.flatnonzero(known | entering) + rows.start
         factors, values, times = self._pose_of(image)
-        self._enter(image, np.flatnonzero(entering) + rows.start, values)
+        self._enter(image, np.flatnonzero(entering) + rows.start, factors, values)
         for row in used:
             self._see(image, int(row), factors, times)
         self._update(image, factors, values, times)
@@ -105,15 +105,16 @@ class _Window:
     def _predicted(self, image: int) -> SE3:
         if image == 0:
             return self._inputs.T_world_body_start
-        return self.poses[-1] @ self._inputs.T_prev_curr[image - 1]
+        return self.poses[-1] @ self._inputs.motion(image)[0]
 
-    def _enter(self, image: int, rows: Ints, values: Any) -> None:
+    def _enter(self, image: int, rows: Ints, factors: Any, values: Any) -> None:
         """Name the landmarks that come in, and put each where its sighting has it."""
         p_world = self._predicted(image) @ self._inputs.points_in_body(rows)
         for row, point in zip(rows, p_world, strict=True):
             key = self._make.landmark_key(self._entered)
             self._keys[int(self._inputs.sightings.landmark_id[row])] = key
             values.insert(key, point)
+            factors.add(self._make.entry(key, point))
             self._entered += 1
 
     def _see(self, image: int, row: int, factors: Any, times: dict[int, float]) -> None:

@@ -51,6 +51,7 @@ class GraphMaker:
             c.focal_px, c.focal_px, 0.0, c.cx_px, c.cy_px, c.baseline_m
         )
         self._mount = to_pose3(c.T_body_camera.se3())
+        self._entry_noise = self.gtsam.noiseModel.Isotropic.Sigma(3, spec.landmark_sigma_m)
         self._noise: dict[tuple[float, str], Any] = {}
 
     def pose_key(self, image: int) -> int:
@@ -69,9 +70,13 @@ class GraphMaker:
         start = to_pose3(self.inputs.T_world_body_start)
         return self.gtsam.PriorFactorPose3(self.pose_key(0), start, noise)
 
+    def entry(self, landmark_key: int, p_world: Array) -> Any:
+        """Hold a landmark weakly to the point where it enters."""
+        return self.gtsam.PriorFactorPoint3(landmark_key, p_world, self._entry_noise)
+
     def motion(self, image: int) -> Any:
         """Tie the pose at an image to the one before it by odometry."""
-        step, covariance = self.inputs.T_prev_curr[image - 1], self.inputs.cov_motion[image - 1]
+        step, covariance = self.inputs.motion(image)
         noise = self.gtsam.noiseModel.Gaussian.Covariance(swapped(covariance))
         keys = self.pose_key(image - 1), self.pose_key(image)
         return self.gtsam.BetweenFactorPose3(*keys, to_pose3(step), noise)

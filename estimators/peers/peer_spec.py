@@ -21,6 +21,9 @@ class PeerSpec(Spec):
         disparity_sigmas_min: A landmark enters with a sighting whose disparity is more than this
             many of its standard deviations, ``sigma_px sqrt(2)``; those of nearly no or of negative
             disparity have no point to start from. Once it is in, all its sightings count.
+        landmark_sigma_m: Weak prior of each landmark at the point where it enters [m]. Without it
+            one that false sightings put behind a camera, where GTSAM's factor has no derivative,
+            would make the system singular.
         covariances: Of which poses the covariance is asked for; where it is not, rows hold NaN.
             ``none`` leaves it out of the estimate, and its cost out of the time.
         prior_sigma_m: Of the given start [m]; GTSAM wants a number.
@@ -30,6 +33,7 @@ class PeerSpec(Spec):
     robust: Literal["none", "huber", "geman_mcclure"] = "none"
     robust_width: Positive = 3.0
     disparity_sigmas_min: Annotated[float, Field(ge=0.0)] = 5.0
+    landmark_sigma_m: Positive = 1000.0
     covariances: Literal["every_image", "last_image", "none"] = "every_image"
     prior_sigma_m: Positive = 1e-6
     prior_sigma_rad: Positive = 1e-6
