@@ -30,8 +30,8 @@ class FrameToFrameSpec(Spec):
 
     Attributes:
         two_view: How the motion between two images is estimated.
-        hold_sigma: Where vision fails and there are no wheels the last motion is held; its relative
-            error, 1 sigma (this project's choice).
+        hold_sigma: Where vision fails and there is no odometry the last motion is held; its
+            relative error, 1 sigma (this project's choice).
         hold_sigma_m: Least such error of the position [m].
         hold_sigma_rad: Least such error of the attitude [rad].
     """
@@ -76,11 +76,12 @@ class FrameToFrame:
     def estimate(self, measurements: Measurements) -> Estimate:
         """Chain the motions between images; see `Estimator`.
 
-        Where too few landmarks agree on a motion the step is bridged with wheel odometry, or the
-        last motion is held where there are no wheels; ``bridged`` among the diagnostics says so.
+        Where too few landmarks agree on a motion the step is bridged with odometry, or the last
+        motion is held where there is none; ``bridged`` among the diagnostics says so.
         """
         sightings, calibration = declared_sightings(measurements)
-        odometry = None if measurements.wheels is None else odometry_track(measurements)
+        moved = measurements.odometry is not None or measurements.wheels is not None
+        odometry = odometry_track(measurements) if moved else None
         steps = self._steps(sightings, calibration, odometry)
         start = _start_pose(measurements, odometry, int(sightings.t_ns[0]))
         poses, covariance = chain(start, steps)

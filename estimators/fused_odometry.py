@@ -20,6 +20,7 @@ from estimators.motion import (
     MotionSpec,
     OdometryTrack,
     declared_wheels,
+    stream_odometry,
     variance_per_metre,
     wheel_displacements,
     wheel_odometry,
@@ -92,11 +93,16 @@ class FusedOdometry:
 def odometry_track(
     measurements: Measurements, spec: FusedOdometrySpec | None = None
 ) -> OdometryTrack:
-    """Give the best odometry there is: with the inertial unit if there is one, else wheels alone.
+    """Give the best odometry there is.
+
+    It is the recording's own odometry if there is one, else wheels with the inertial unit, else
+    wheels alone.
 
     Raises:
-        RecordingError: The recording has no wheels.
+        RecordingError: The recording has neither odometry nor wheels.
     """
+    if measurements.odometry is not None:
+        return stream_odometry(measurements)
     spec = spec or FusedOdometrySpec()
     calibration = measurements.calibration.imu
     if measurements.imu is None or calibration is None:

@@ -1,4 +1,4 @@
-"""Motion from wheels: rolling, steered wheels on one rigid body.
+"""Motion from wheels: rolling, steered wheels on one rigid body; and odometry of any other kind.
 
 The contact point of wheel i rolls by ``d_i = r dtheta_i`` along its heading ``delta_i``. On a rigid
 body that moves by the planar twist ``u = (dx, dy, dpsi)`` the same point moves by
@@ -19,7 +19,7 @@ from lpet_sim.errors import RecordingError
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import NS_PER_S, Array, ArrayStruct, Ints
 from lpet_sim.recording.calibration import WheelCalibration
-from lpet_sim.recording.streams import Measurements, WheelStream
+from lpet_sim.recording.streams import Measurements, OdometryStream, WheelStream
 from lpet_sim.recording.trajectory import Trajectory
 from lpet_sim.spec import Spec
 
@@ -69,6 +69,8 @@ class OdometryTrack:
         variance_per_m: Variance of ``xi`` that each metre adds, Shape (6,).
         scale_sigma: Relative error of each part of ``xi``, 1 sigma, fully correlated, Shape (6,).
         variance_per_s: Variance of ``xi`` that each second adds, Shape (6,).
+        variance_so_far: Variance of ``xi`` added up to each pose beside these, Shape (n, 6); None
+            adds none.
     """
 
     trajectory: Trajectory
@@ -76,6 +78,7 @@ class OdometryTrack:
     variance_per_m: Array
     scale_sigma: Array
     variance_per_s: Array = field(default_factory=lambda: np.zeros(6))
+    variance_so_far: Array | None = None
 
     def between(self, t_prev_ns: int, t_curr_ns: int) -> tuple[SE3, Array]:
         """Give a step and its covariance.
@@ -96,6 +99,9 @@ class OdometryTrack:
         rolled = np.diff(np.interp(query, self.trajectory.t_ns, self.rolled_m))[0]
         variance = self.variance_per_m * rolled
         variance = variance + self.variance_per_s * (t_curr_ns - t_prev_ns) / NS_PER_S
+        if self.variance_so_far is not None:
+            known, summed = self.trajectory.t_ns, self.variance_so_far.T
+            variance = variance + [np.diff(np.interp(query, known, s))[0] for s in summed]
         along = self.scale_sigma * T_prev_curr.log()
         return T_prev_curr, np.diag(variance) + np.outer(along, along)
 
@@ -205,6 +211,39 @@ def wheel_odometry(measurements: Measurements, spec: MotionSpec | None = None) -
         variance_per_metre(calibration, spec or MotionSpec()),
         np.full(6, calibration.scale_sigma),
     )
+
+
+def stream_odometry(measurements: Measurements) -> OdometryTrack:
+    """Chain the motion increments that some odometry of its own delivers, from the known start.
+
+    Raises:
+        RecordingError: The recording has no odometry, or no step of it.
+    """
+    odometry = declared_odometry(measurements)
+    start = measurements.calibration.T_world_body_start.se3()
+    poses = integrate(start, np.array(odometry.twist[1:]))
+    length_m = np.linalg.norm(odometry.twist[:, :3], axis=-1)
+    return OdometryTrack(
+        Trajectory(odometry.t_ns.copy(), poses),
+        np.cumsum(length_m) - length_m[0],
+        np.zeros(6),
+        np.array(odometry.scale_sigma[0]),
+        variance_so_far=np.cumsum(odometry.variance, axis=0),
+    )
+
+
+def declared_odometry(measurements: Measurements) -> OdometryStream:
+    """Give the stream of motion increments.
+
+    Raises:
+        RecordingError: It is absent, or there is no step.
+    """
+    measurements.require("odometry")
+    odometry = measurements.odometry
+    if odometry is None or len(odometry) < 2:
+        held = 0 if odometry is None else len(odometry)
+        raise RecordingError(f"odometry needs at least 2 rows, one step; there are {held}")
+    return odometry
 
 
 def declared_wheels(measurements: Measurements) -> tuple[WheelStream, WheelCalibration]:

@@ -158,6 +158,18 @@ def import_kitti(
     wrote(out)
 
 
+@import_app.command("starry-night")
+def import_starry_night(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of its MATLAB file.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT.rrd", help="The recording to write.")],
+) -> None:
+    """Import the Starry Night data set: stereo sightings, gyro and velocity."""
+    from lpet_sim.sweep.importing import import_starry_night as run
+
+    run(folder, out)
+    wrote(out)
+
+
 @app.command()
 def demo(
     out: Annotated[Path, typer.Option(help="Folder to write into.")] = Path("out/demo"),

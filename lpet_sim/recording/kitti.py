@@ -20,7 +20,7 @@ from PIL import Image
 from pydantic import Field
 
 from lpet_sim.errors import RecordingError
-from lpet_sim.geometry import SE3, so3
+from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
 from lpet_sim.recording.calibration import Calibration, PoseSpec, StereoCalibration
 from lpet_sim.recording.recording import Manifest, Recording
@@ -94,7 +94,7 @@ def import_kitti(folder: Path | str, spec: KittiSpec | None = None) -> Recording
         gravity_mps2=GRAVITY_MPS2,
     )
     manifest = Manifest(f"kitti {root.name}", None, {"import": spec.to_mapping()})
-    truth = Truth(_body_truth(images.t_ns, T_world_body))
+    truth = Truth(BodyTruth.from_poses(images.t_ns, T_world_body))
     return Recording(manifest, Measurements(calibration, images=images), truth)
 
 
@@ -181,15 +181,3 @@ def _orthonormal(rotation: Array) -> Array:
     """Give the nearest rotations: text files round to seven digits."""
     u, _, vt = np.linalg.svd(rotation)
     return np.asarray(u @ vt)
-
-
-def _body_truth(t_ns: Ints, T_world_body: SE3) -> BodyTruth:
-    """Add velocities by central differences of the poses."""
-    t_s = t_ns / NS_PER_S
-    before = np.maximum(np.arange(len(t_s)) - 1, 0)
-    after = np.minimum(np.arange(len(t_s)) + 1, len(t_s) - 1)
-    span = np.maximum(t_s[after] - t_s[before], 1e-9)[:, None]
-    R = T_world_body.rotation
-    turned = so3.log(np.swapaxes(R[before], -1, -2) @ R[after])
-    moved = T_world_body.translation[after] - T_world_body.translation[before]
-    return BodyTruth(t_ns.copy(), T_world_body, moved / span, turned / span)

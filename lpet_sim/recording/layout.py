@@ -9,6 +9,7 @@ CALIBRATION = "/calibration"
 
 IMU = "/measurements/imu"
 WHEELS = "/measurements/wheels"
+ODOMETRY = "/measurements/odometry"
 SIGHTINGS = "/measurements/sightings"
 IMAGE_INDEX = "/measurements/images/index"
 

@@ -17,7 +17,13 @@ from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.png import decode_png
 from lpet_sim.recording.recording import SCHEMA_VERSION, Manifest, Recording
 from lpet_sim.recording.store import StoreReader
-from lpet_sim.recording.streams import ImuStream, Measurements, SightingStream, WheelStream
+from lpet_sim.recording.streams import (
+    ImuStream,
+    Measurements,
+    OdometryStream,
+    SightingStream,
+    WheelStream,
+)
 from lpet_sim.recording.trajectory import Trajectory
 from lpet_sim.recording.truth import BodyTruth, Event, Truth, WheelTruth
 
@@ -147,6 +153,7 @@ def _measurements(store: StoreReader) -> Measurements:
         wheels=put_together(WheelStream, layout.WHEELS, columns),
         sightings=put_together(SightingStream, layout.SIGHTINGS, columns),
         images=None if images is None else StoredImages(store.path, images.t_ns),
+        odometry=put_together(OdometryStream, layout.ODOMETRY, columns),
     )
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lpet_sim.geometry import SE3
-from lpet_sim.recording.arrays import Array, ArrayStruct, Ints
+from lpet_sim.geometry import SE3, so3
+from lpet_sim.recording.arrays import NS_PER_S, Array, ArrayStruct, Ints
 from lpet_sim.recording.trajectory import Trajectory
 
 CONTACT_NONE, CONTACT_SOIL, CONTACT_ROCK = 0, 1, 2
@@ -30,6 +30,16 @@ class BodyTruth(ArrayStruct):
     T_world_body: SE3
     v_world_body_mps: Array
     omega_body_radps: Array
+
+    @classmethod
+    def from_poses(cls, t_ns: Ints, T_world_body: SE3) -> BodyTruth:
+        """Add velocities by central differences of the poses, Shape (n,), one-sided at the ends."""
+        row = np.arange(len(t_ns))
+        before, after = np.maximum(row - 1, 0), np.minimum(row + 1, len(t_ns) - 1)
+        span_s = np.maximum((t_ns[after] - t_ns[before]) / NS_PER_S, 1e-9)[:, None]
+        R, p = T_world_body.rotation, T_world_body.translation
+        turned = so3.log(np.swapaxes(R[before], -1, -2) @ R[after])
+        return cls(t_ns.copy(), T_world_body, (p[after] - p[before]) / span_s, turned / span_s)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from lpet_sim.recording.recording import Manifest, Recording
 from lpet_sim.recording.scene import DrawnLink, Mesh
 from lpet_sim.recording.sketch import Sketch
 from lpet_sim.recording.store import StoreWriter
-from lpet_sim.recording.streams import ImuStream, SightingStream, WheelStream
+from lpet_sim.recording.streams import ImuStream, OdometryStream, SightingStream, WheelStream
 from lpet_sim.recording.truth import Event, Truth, in_order
 from lpet_sim.recording.visuals import Pen
 
@@ -109,6 +109,10 @@ class RecordingWriter:
     def log_wheels(self, wheels: WheelStream) -> None:
         """Add a piece of the encoder readings."""
         self._log(layout.WHEELS, wheels)
+
+    def log_odometry(self, odometry: OdometryStream) -> None:
+        """Add a piece of the motion increments."""
+        self._log(layout.ODOMETRY, odometry)
 
     def log_sightings(self, sightings: SightingStream) -> None:
         """Add the sightings of some image pairs."""
@@ -195,6 +199,8 @@ def write_recording(path: Path | str, recording: Recording, keep_images: int = 1
             out.log_imu(measurements.imu)
         if measurements.wheels is not None:
             out.log_wheels(measurements.wheels)
+        if measurements.odometry is not None:
+            out.log_odometry(measurements.odometry)
         if measurements.images is not None:
             for index, t_ns in enumerate(measurements.images.t_ns):
                 out.log_images(int(t_ns), *measurements.images.pair(index))

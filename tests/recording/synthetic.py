@@ -18,6 +18,7 @@ from lpet_sim.recording.streams import (
     ImagesInMemory,
     ImuStream,
     Measurements,
+    OdometryStream,
     SightingStream,
     WheelStream,
 )
@@ -149,6 +150,15 @@ def sightings(
     )
 
 
+def odometry(duration_s: float = 20.0, seed: int = 0) -> OdometryStream:
+    """Make motion increments of a tenth of a second."""
+    rng = stream(seed, "synthetic", "odometry")
+    t_ns = np.arange(int(duration_s * 10) + 1) * (NS // 10)
+    twist = rng.normal(0.0, 0.01, (len(t_ns), 6))
+    twist[0] = 0.0
+    return OdometryStream(t_ns, twist, rng.random((len(t_ns), 6)), np.full((len(t_ns), 6), 0.03))
+
+
 def images(
     duration_s: float = 20.0, bits: int = 8, width: int = 64, height: int = 48
 ) -> ImagesInMemory:
@@ -173,7 +183,12 @@ def recording(duration_s: float = 20.0, seed: int = 0, bits: int = 8) -> Recordi
     wheels = WheelStream(t_w, rng.normal(size=(len(t_w), 6)), rng.normal(size=(len(t_w), 6)))
     manifest = Manifest("simulation", seed, {"drive": {"speed_mps": 0.1}}, {"lpet": "0.1.0"})
     measurements = Measurements(
-        calibration(), imu, wheels, sightings(duration_s, seed), images(duration_s, bits)
+        calibration(),
+        imu,
+        wheels,
+        sightings(duration_s, seed),
+        images(duration_s, bits),
+        odometry(duration_s, seed),
     )
     return Recording(manifest, measurements, truth_)
 

@@ -11,12 +11,12 @@ import pytest
 
 from lpet_sim.recording.reader import StoredImages, read_measurements, read_recording
 from lpet_sim.recording.recording import Recording
-from lpet_sim.recording.streams import ImuStream, SightingStream, StereoImages
+from lpet_sim.recording.streams import ImuStream, Measurements, SightingStream, StereoImages
 from lpet_sim.recording.truth import Truth
 from lpet_sim.recording.writer import RecordingWriter, write_recording
 from tests.recording import synthetic
 
-STREAMS = ("imu", "wheels", "sightings")
+STREAMS = ("imu", "wheels", "sightings", "odometry")
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_special_floats_come_back_to_the_bit(tmp_path: Path, original: Recording
     """Subnormals, negative zero, infinities and NaN survive."""
     values = np.array([[5e-324, -0.0, np.inf], [-np.inf, np.nan, 1 / 3]])
     imu = ImuStream(np.array([-7, 2**53 + 1]), values, values[::-1].copy())
-    measurements = replace(original.measurements, imu=imu, wheels=None, sightings=None, images=None)
+    measurements = Measurements(original.measurements.calibration, imu)
     write_recording(tmp_path / "a.rrd", Recording(original.manifest, measurements))
     assert read_measurements(tmp_path / "a.rrd").imu.equals(imu)
 
@@ -103,6 +103,7 @@ def test_pieces_give_the_same_arrays_as_the_whole(tmp_path: Path, original: Reco
             out.log_truth(Truth(part(t.body, low, high), part(t.wheels, low, high), events))
             out.log_sightings(part(m.sightings, low, high))
             out.log_wheels(part(m.wheels, low, high))
+            out.log_odometry(part(m.odometry, low, high))
     back = read_recording(tmp_path / "p.rrd")
     assert all(getattr(back.measurements, n).equals(getattr(m, n)) for n in STREAMS)
     assert back.truth.body.equals(t.body) and back.truth.wheels.equals(t.wheels)
@@ -132,6 +133,17 @@ def test_an_empty_stream_is_not_an_absent_one(tmp_path: Path, original: Recordin
     assert len(back.measurements.imu) == 0 and back.measurements.imu.gyro_radps.shape == (0, 3)
     assert back.measurements.wheels is None and back.measurements.sightings is None
     assert back.measurements.images is None and back.truth is None
+
+
+def test_a_recording_without_odometry_reads_as_before(
+    tmp_path: Path, original: Recording, written: Path
+) -> None:
+    """The stream is an addition: where it was never written it is absent, all else is the same."""
+    measurements = replace(original.measurements, odometry=None)
+    write_recording(tmp_path / "w.rrd", Recording(original.manifest, measurements))
+    back, whole = read_measurements(tmp_path / "w.rrd"), read_measurements(written)
+    assert back.odometry is None and whole.odometry is not None
+    assert all(getattr(back, n).equals(getattr(whole, n)) for n in STREAMS if n != "odometry")
 
 
 def test_an_imported_recording_needs_neither_wheels_nor_truth(tmp_path: Path) -> None:
