@@ -157,11 +157,11 @@ def test_a_lag_as_long_as_the_run_ends_where_the_batch_does() -> None:
 
 
 def test_a_short_lag_is_less_accurate_than_a_long_one() -> None:
-    """Over 10 seeds and 30 images."""
+    """Over 6 seeds and 20 images."""
     ends = {1: [], 10: []}  # type: dict[int, list[float]]
-    for lag, seed in ((lag, seed) for lag in ends for seed in range(10)):
+    for lag, seed in ((lag, seed) for lag in ends for seed in range(6)):
         spec = {"lag_images": lag, "covariances": "none"}
-        found = run("gtsam_fixed_lag", recorded(seed, 30), **spec)
+        found = run("gtsam_fixed_lag", recorded(seed, 20), **spec)
         ends[lag].append(float(np.linalg.norm(error(found)[-1, :3])))
     assert np.mean(np.square(ends[1])) > 1.5 * np.mean(np.square(ends[10]))
 
@@ -244,9 +244,10 @@ def test_a_rover_that_stands_between_images_breaks_no_graph() -> None:
     twist, variance = given.odometry.twist.copy(), given.odometry.variance.copy()
     twist[2], variance[2] = 0.0, 0.0
     still = replace(given, odometry=replace(given.odometry, twist=twist, variance=variance))
-    for name in PEERS:
-        poses = run(name, still).trajectory.T_world_body
-        assert np.abs((poses[1].inverse() @ poses[2]).log()).max() < 1e-3
+    batch, window = (run(name, still) for name in ("gtsam_batch", "gtsam_fixed_lag"))
+    poses = batch.trajectory.T_world_body
+    assert np.abs((poses[1].inverse() @ poses[2]).log()).max() < 1e-3
+    assert window.covariance is not None and np.all(np.isfinite(window.covariance))
 
 
 @pytest.mark.parametrize("name", sorted(PEERS))
