@@ -23,7 +23,7 @@ def camera_vector(calibration: StereoCalibration) -> Array:
 
 
 @njit(cache=True)
-def _push(
+def push(
     camera: Array, P: tuple[float, float, float, float], dP: tuple[float, float, float, float]
 ) -> tuple[float, float, float]:
     """Give how the projection (u_left, u_right, v) of ``(P, w)`` changes with ``(dP, dw)``.
@@ -64,15 +64,15 @@ def transfer_into(
     predicted[0], predicted[2] = focal * X / Z + cx, focal * Y / Z + cy
     predicted[1] = predicted[0] - focal * b * w / Z
     along_u = (b * r[0, 0] - t[0], b * r[0, 1] - t[1], b * r[0, 2] - t[2], 1.0)
-    G[0, 0], G[1, 0], G[2, 0] = _push(camera, P, along_u)
-    G[0, 1], G[1, 1], G[2, 1] = _push(camera, P, (t[0], t[1], t[2], -1.0))
-    G[0, 2], G[1, 2], G[2, 2] = _push(camera, P, (b * r[1, 0], b * r[1, 1], b * r[1, 2], 0.0))
-    J[0, 0], J[1, 0], J[2, 0] = _push(camera, P, (-w, 0.0, 0.0, 0.0))
-    J[0, 1], J[1, 1], J[2, 1] = _push(camera, P, (0.0, -w, 0.0, 0.0))
-    J[0, 2], J[1, 2], J[2, 2] = _push(camera, P, (0.0, 0.0, -w, 0.0))
-    J[0, 3], J[1, 3], J[2, 3] = _push(camera, P, (0.0, Z, -Y, 0.0))
-    J[0, 4], J[1, 4], J[2, 4] = _push(camera, P, (-Z, 0.0, X, 0.0))
-    J[0, 5], J[1, 5], J[2, 5] = _push(camera, P, (Y, -X, 0.0, 0.0))
+    G[0, 0], G[1, 0], G[2, 0] = push(camera, P, along_u)
+    G[0, 1], G[1, 1], G[2, 1] = push(camera, P, (t[0], t[1], t[2], -1.0))
+    G[0, 2], G[1, 2], G[2, 2] = push(camera, P, (b * r[1, 0], b * r[1, 1], b * r[1, 2], 0.0))
+    J[0, 0], J[1, 0], J[2, 0] = push(camera, P, (-w, 0.0, 0.0, 0.0))
+    J[0, 1], J[1, 1], J[2, 1] = push(camera, P, (0.0, -w, 0.0, 0.0))
+    J[0, 2], J[1, 2], J[2, 2] = push(camera, P, (0.0, 0.0, -w, 0.0))
+    J[0, 3], J[1, 3], J[2, 3] = push(camera, P, (0.0, Z, -Y, 0.0))
+    J[0, 4], J[1, 4], J[2, 4] = push(camera, P, (-Z, 0.0, X, 0.0))
+    J[0, 5], J[1, 5], J[2, 5] = push(camera, P, (Y, -X, 0.0, 0.0))
 
 
 @njit(cache=True)

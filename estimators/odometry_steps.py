@@ -18,7 +18,7 @@ def image_odometry(
     """Give the motion between given times, such as those of the images.
 
     It comes from the recording's own odometry if there is one, else from wheels and inertial unit,
-    else from wheels alone. Before its first and after its last reading the rover counts as standing.
+    else from wheels alone. Before its first and after its last reading the rover is held to stand.
 
     Args:
         measurements: Streams and declared calibration.
@@ -26,7 +26,7 @@ def image_odometry(
         spec: Parameters of the odometry from wheels; the defaults if None.
 
     Returns:
-        Increments at these times; the variance of the first is that from the start of the odometry.
+        Increments at these times; the first is the motion from the start of the odometry.
 
     Raises:
         RecordingError: The recording has neither odometry nor wheels.
@@ -53,7 +53,8 @@ def _of_track(track: OdometryTrack, t_ns: Ints) -> OdometryStream:
     rolled_m = np.interp(within, known, track.rolled_m)
     seconds = (within - known[0]) / NS_PER_S
     spent = np.outer(rolled_m, track.variance_per_m) + np.outer(seconds, track.variance_per_s)
-    return _increments(t_ns, track.trajectory.at(within), spent, track.scale_sigma)
+    poses = track.trajectory.at(np.concatenate([known[:1], within]))
+    return _increments(t_ns, poses, spent, track.scale_sigma)
 
 
 def _resampled(stream: OdometryStream, t_ns: Ints) -> OdometryStream:
@@ -62,16 +63,12 @@ def _resampled(stream: OdometryStream, t_ns: Ints) -> OdometryStream:
     chain = Trajectory(known.copy(), chained(stream, SE3.identity()))
     summed = np.cumsum(stream.variance, axis=0)
     spent = np.stack([np.interp(within, known, summed[:, i]) for i in range(6)], axis=1)
-    return _increments(t_ns, chain.at(within), spent, stream.scale_sigma[0])
+    poses = chain.at(np.concatenate([known[:1], within]))
+    return _increments(t_ns, poses, spent, stream.scale_sigma[0])
 
 
 def _increments(t_ns: Ints, poses: SE3, spent: Array, scale_sigma: Array) -> OdometryStream:
-    """Give the steps between poses and what each adds to the variance spent so far."""
-    n = len(t_ns)
-    twist, variance = np.zeros((n, 6)), np.zeros((n, 6))
-    if n > 1:
-        twist[1:] = (poses[:-1].inverse() @ poses[1:]).log()
-        variance[1:] = np.diff(spent, axis=0)
-    if n:
-        variance[0] = spent[0]
-    return OdometryStream(np.array(t_ns), twist, variance, np.tile(scale_sigma, (n, 1)))
+    """Give the steps between n + 1 poses and what each adds to the variance spent so far."""
+    twist = (poses[:-1].inverse() @ poses[1:]).log()
+    variance = np.diff(spent, axis=0, prepend=np.zeros((1, 6)))
+    return OdometryStream(np.array(t_ns), twist, variance, np.tile(scale_sigma, (len(t_ns), 1)))

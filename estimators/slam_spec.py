@@ -77,12 +77,16 @@ class AnchorSpec(Spec):
         prefer: Which ones are chosen if there are more: the farthest, which stay in view, or those
             known best by the size of their disparity, the nearest.
         unseen_images_max: An anchor unseen for longer leaves like any other landmark; None: never.
+        standstill_m: The rover stands at the start until odometry says that it is further away [m].
+        standstill_rad: Or that it turned by more [rad].
     """
 
     count_max: Annotated[int, Field(ge=1)] = 30
     looks_min: Annotated[int, Field(ge=2)] = 10
     prefer: Literal["far", "near"] = "far"
     unseen_images_max: Annotated[int, Field(ge=1)] | None = None
+    standstill_m: Annotated[float, Field(gt=0.0)] = 0.01
+    standstill_rad: Annotated[float, Field(gt=0.0)] = 0.01
 
 
 class SlamSpec(Spec):
@@ -100,6 +104,14 @@ class SlamSpec(Spec):
         association_check: Beside the gate of each sighting: ``none``, or ``one_point_ransac``.
         gate_probability: Share of fitting sightings that pass their chi-square gate.
         sightings_min: An image with fewer accepted sightings counts as bridged by odometry.
+        misfits_max: A landmark leaves after this many sightings in a row that do not fit.
+        slip_share: If fewer than this share of the known landmarks pass their gates, the wheels may
+            have slipped: the step is then believed to within its own length only.
+        slip_sigma_m: Least error of such a step [m].
+        slip_sigma_rad: Likewise of its rotation [rad].
+        free_sigma_m: Error of a step for which there is no odometry, along each axis; it is held to
+            be the last one [m].
+        free_sigma_rad: Likewise of its rotation [rad].
         noise_scale: Factor on the declared noise of sightings and odometry, 1 sigma; for tests of
             what a filter makes of wrong noise.
     """
@@ -111,6 +123,12 @@ class SlamSpec(Spec):
     association_check: Literal["none", "one_point_ransac"] = "one_point_ransac"
     gate_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.999
     sightings_min: Annotated[int, Field(ge=0)] = 3
+    misfits_max: Annotated[int, Field(ge=1)] = 3
+    slip_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    slip_sigma_m: Annotated[float, Field(gt=0.0)] = 0.01
+    slip_sigma_rad: Annotated[float, Field(gt=0.0)] = 0.005
+    free_sigma_m: Annotated[float, Field(gt=0.0)] = 0.3
+    free_sigma_rad: Annotated[float, Field(gt=0.0)] = 0.03
     noise_scale: Annotated[float, Field(gt=0.0)] = 1.0
 
     @model_validator(mode="after")

@@ -1,0 +1,163 @@
+"""The covariance of a state that grows and shrinks, changed in place.
+
+The state is a few variables of the rover followed by blocks of three, one for each landmark. A
+block whose rows and columns are zero is free: no variable of the state stands there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from scipy.linalg import blas, lapack
+
+from estimators.gaussian import symmetrise
+from lpet_sim.errors import BrokenFilterError
+from lpet_sim.recording.arrays import Array
+
+
+@njit(cache=True)
+def move_block(P: Array, F: Array, cov_added: Array) -> None:
+    """Carry the first variables of a state through a linear step, in place: ``F P F^T + cov``.
+
+    Args:
+        P: Covariance of the whole state, Shape (n, n); changed.
+        F: Derivative of the first k variables by themselves, Shape (k, k).
+        cov_added: What the step adds to them, Shape (k, k).
+    """
+    k, n = len(F), len(P)
+    old = P[:k].copy()
+    for i in range(k):
+        for j in range(n):
+            total = 0.0
+            for a in range(k):
+                total += F[i, a] * old[a, j]
+            P[i, j] = total
+            P[j, i] = total
+    corner = symmetrise(F @ (np.ascontiguousarray(old[:, :k]) @ F.T) + cov_added)
+    for i in range(k):
+        for j in range(k):
+            P[i, j] = corner[i, j]
+
+
+@njit(cache=True)
+def add_noise(P: Array, B_T: Array) -> None:
+    """Add ``B B^T`` in place, for noise of unit variance that enters a state by B.
+
+    Args:
+        P: Covariance, Shape (n, n); changed.
+        B_T: B transposed, Shape (m, n).
+    """
+    n, m = len(P), len(B_T)
+    for i in range(n):
+        for k in range(m):
+            factor = B_T[k, i]
+            if factor != 0.0:
+                for j in range(n):
+                    P[i, j] += factor * B_T[k, j]
+
+
+@njit(cache=True)
+def join_block(P: Array, row: int, J: Array, variance: float) -> None:
+    """Let three free variables become ``J x + noise`` of the first variables x, in place.
+
+    Args:
+        P: Covariance, Shape (n, n); changed in the three rows and columns.
+        row: First of the three.
+        J: Their derivative by the first k variables, Shape (3, k).
+        variance: Of the noise of each, independent of all else.
+    """
+    n, k = len(P), J.shape[1]
+    rows = np.zeros((3, n))
+    for i in range(3):
+        for a in range(k):
+            for j in range(n):
+                rows[i, j] += J[i, a] * P[a, j]
+    for i in range(3):
+        for j in range(n):
+            P[row + i, j] = rows[i, j]
+            P[j, row + i] = rows[i, j]
+    for i in range(3):
+        for j in range(3):
+            total = variance if i == j else 0.0
+            for a in range(k):
+                total += 0.5 * (rows[i, a] * J[j, a] + rows[j, a] * J[i, a])
+            P[row + i, row + j] = total
+
+
+@njit(cache=True)
+def free_block(P: Array, row: int) -> None:
+    """Take three variables out of the state, in place: what is left loses nothing."""
+    for i in range(3):
+        for j in range(len(P)):
+            P[row + i, j] = 0.0
+            P[j, row + i] = 0.0
+
+
+def enlarged(P: Array, n: int) -> Array:
+    """Give the covariance with free variables at its end, Shape (n, n)."""
+    out = np.zeros((n, n))
+    out[: len(P), : len(P)] = P
+    return out
+
+
+@njit(cache=True)
+def drop_correlations(P: Array, first: int, keep_first: bool) -> None:
+    """Set every correlation between blocks of three variables to zero, in place.
+
+    Args:
+        P: Covariance, Shape (n, n); changed.
+        first: Number of variables before the blocks; correlations among them stay.
+        keep_first: Whether the correlations of these with the blocks stay; then what comes out
+            need not be positive definite.
+    """
+    n = len(P)
+    for i in range(first, n):
+        block = (i - first) // 3
+        for j in range(0 if not keep_first else first, n):
+            if j < first or (j - first) // 3 != block:
+                P[i, j] = 0.0
+                P[j, i] = 0.0
+
+
+@njit(cache=True)
+def mirror_lower(P: Array) -> None:
+    """Copy the lower triangle over the upper one, in place, in tiles that fit the cache."""
+    n, tile = len(P), 32
+    for i0 in range(0, n, tile):
+        for j0 in range(0, i0 + 1, tile):
+            for i in range(i0, min(i0 + tile, n)):
+                for j in range(j0, min(j0 + tile, i)):
+                    P[j, i] = P[i, j]
+
+
+def update_in_place(P: Array, PH_T: Array, S: Array, innovation: Array) -> tuple[Array, float]:
+    """Take in a measurement whose ``P H^T`` is at hand, in Joseph's form multiplied out.
+
+    ``K = P H^T S^-1``; ``(I - K H) P (I - K H)^T + K cov_meas K^T`` is ``P - K D^T - D K^T`` with
+    ``D = P H^T - K S / 2``: for every K, not for the optimal one alone, so that an error of K
+    enters squared. One symmetric rank-2m product, the least that a full covariance costs.
+
+    Args:
+        P: Covariance, Shape (n, n), C-contiguous; changed.
+        PH_T: ``P H^T``, Shape (n, m), C-contiguous.
+        S: Covariance of the innovation, Shape (m, m).
+        innovation: Measured minus predicted, Shape (m,).
+
+    Returns:
+        The correction of the state, Shape (n,), and ``innovation^T S^-1 innovation``.
+
+    Raises:
+        BrokenFilterError: S is not positive definite.
+
+    Reference:
+        Bar-Shalom, Li, Kirubarajan (2001), eq. 5.2.3-18 [recalled].
+    """
+    L, failed = lapack.dpotrf(S, lower=1)
+    if failed:
+        raise BrokenFilterError("the covariance of an innovation is not positive definite")
+    K_T, _ = lapack.dpotrs(L, PH_T.T, lower=1)
+    weighted, _ = lapack.dpotrs(L, innovation, lower=1)
+    D_T = blas.dgemm(-0.5, S, K_T, 1.0, PH_T.T)
+    blas.dsyr2k(-1.0, K_T, D_T, 1.0, P.T, trans=1, lower=0, overwrite_c=1)
+    mirror_lower(P)
+    return K_T.T @ innovation, float(innovation @ weighted)

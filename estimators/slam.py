@@ -1,0 +1,234 @@
+"""EKF-SLAM with a stereo camera: one filter, the paper's algorithms as values of its spec.
+
+For each image pair: odometry moves the pose; landmarks in the map that are seen again correct pose
+and map together; who is new enters and who has served leaves, as the policy says. While an
+observable filter stands at the start every landmark stays, and those seen best become anchors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators import slam_kernels
+from estimators.frame_to_frame import declared_sightings
+from estimators.gaussian import chi_square_threshold
+from estimators.odometry_steps import image_odometry
+from estimators.retention import build_policy, choose_anchors, expired_anchors
+from estimators.slam_map import LandmarkMap
+from estimators.slam_spec import BoundedQueue, SlamSpec
+from estimators.slam_state import Innovations, SlamState
+from lpet_sim.geometry import SE3
+from lpet_sim.recording.arrays import Array, Ints
+from lpet_sim.recording.calibration import StereoCalibration
+from lpet_sim.recording.estimate import Estimate
+from lpet_sim.recording.streams import Measurements, OdometryStream
+from lpet_sim.recording.trajectory import Trajectory
+
+LOGGED = (
+    "sightings",
+    "accepted",
+    "rejected",
+    "matched",
+    "new",
+    "dropped",
+    "landmarks",
+    "anchors_seen",
+    "nis",
+    "nis_dof",
+    "slipped",
+    "bridged",
+)
+"""The diagnostics, one value for each image.
+
+``matched`` sightings are of landmarks in the map, ``accepted`` and ``rejected`` ones of them passed
+or failed the checks; ``new`` and ``dropped`` landmarks entered and left; ``landmarks`` is the size
+of the state; ``nis`` the normalised innovation squared of ``nis_dof`` numbers; ``slipped`` is 1
+where odometry was not believed, ``bridged`` where too few sightings were accepted.
+"""
+
+
+@dataclass(frozen=True)
+class Slam:
+    """The filter.
+
+    Attributes:
+        spec: The variant.
+        name: The name under which results are reported.
+        needs: The streams without which it cannot run.
+
+    Reference:
+        Bakambu, Langley, Mukherji, sections 3.4 and 4; the right-invariant form after Barrau and
+        Bonnabel (2015), An EKF-SLAM algorithm with consistency properties [recalled].
+    """
+
+    spec: SlamSpec = field(default_factory=SlamSpec)
+    name: str = "slam"
+    needs: ClassVar[tuple[str, ...]] = ("sightings",)
+
+    def estimate(self, measurements: Measurements) -> Estimate:
+        """Run the filter over the images; see `Estimator`.
+
+        Without odometry a step is held to be like the one before it.
+
+        Raises:
+            BrokenFilterError: The covariance is no longer positive definite.
+        """
+        sightings, calibration = declared_sightings(measurements)
+        known = measurements.odometry is not None or measurements.wheels is not None
+        odometry = image_odometry(measurements, sightings.t_ns) if known else None
+        start = measurements.calibration.T_world_body_start.se3()
+        run = SlamRun(self.spec, start, calibration)
+        poses, covariance = list[SE3](), list[Array]()
+        for k in range(len(sightings)):
+            run.advance(*_step(odometry, k, poses, self.spec))
+            rows = sightings.rows(k)
+            stereo_px, sigma_px = sightings.stereo_px[rows], sightings.sigma_px[rows]
+            run.see(sightings.landmark_id[rows], stereo_px, sigma_px)
+            poses.append(run.state.pose)
+            covariance.append(run.state.pose_covariance())
+        trajectory = Trajectory(sightings.t_ns.copy(), SE3.stack(poses))
+        return Estimate(self.name, trajectory, np.array(covariance), run.diagnostics())
+
+
+class SlamRun:
+    """The filter on its way.
+
+    Attributes:
+        state: Pose, map and covariance.
+    """
+
+    def __init__(self, spec: SlamSpec, start: SE3, calibration: StereoCalibration) -> None:
+        self._spec = spec
+        self.state = SlamState(start, calibration, spec.formulation)
+        self._policy = build_policy(spec.retention)
+        self._threshold = chi_square_threshold(3, spec.gate_probability)
+        self._standing = spec.anchors is not None
+        self._driven = SE3.identity()
+        self._twist = np.zeros(6)
+        self._log: dict[str, list[float]] = {name: [] for name in LOGGED}
+
+    def advance(self, twist: Array, noise: Array) -> None:
+        """Move by odometry; when an observable filter sets off it chooses its anchors."""
+        self.state.advance(twist, self._spec.noise_scale * noise)
+        self._twist = twist
+        if self._standing and self._spec.anchors is not None:
+            self._driven = self._driven @ SE3.exp(twist)
+            moved = np.linalg.norm(self._driven.log().reshape(2, 3), axis=1)
+            anchors = self._spec.anchors
+            self._standing = bool(
+                moved[0] <= anchors.standstill_m and moved[1] <= anchors.standstill_rad
+            )
+            if not self._standing:
+                self.landmarks.pinned[choose_anchors(self.landmarks, anchors)] = True
+
+    def see(self, landmark_id: Ints, stereo_px: Array, sigma_px: Array) -> None:
+        """Take in the sightings of one image pair."""
+        variance = (self._spec.noise_scale * sigma_px) ** 2
+        slots = self.landmarks.slots(landmark_id)
+        known = slots >= 0
+        seen = self.state.innovations(slots[known], stereo_px[known], variance[known])
+        slipped, accepted = self._checked(seen)
+        nis = self._correct(seen.take(accepted)) if accepted.any() else 0.0
+        self.landmarks.count_image(seen.slots[accepted], seen.slots[~accepted])
+        count = int(accepted.sum())
+        new, dropped = self._renew(landmark_id[~known], stereo_px[~known], variance[~known])
+        self._note(
+            sightings=len(slots),
+            accepted=count,
+            rejected=len(seen) - count,
+            matched=len(seen),
+            new=new,
+            dropped=dropped,
+            landmarks=len(self.landmarks),
+            anchors_seen=int(self.landmarks.pinned[seen.slots[accepted]].sum()),
+            nis=nis,
+            nis_dof=3 * count,
+            slipped=slipped,
+            bridged=float(bool(self._log["sightings"]) and count < self._spec.sightings_min),
+        )
+
+    @property
+    def landmarks(self) -> LandmarkMap:
+        """The map."""
+        return self.state.landmarks
+
+    def diagnostics(self) -> dict[str, Array]:
+        """Give what was logged of each image."""
+        return {name: np.array(values) for name, values in self._log.items()}
+
+    def _checked(self, seen: Innovations) -> tuple[bool, NDArray[np.bool_]]:
+        """Tell whether odometry slipped, and which sightings fit by themselves and together."""
+        fits = self.state.squared_distances(seen) <= self._threshold
+        slipped = len(seen) >= self._spec.sightings_min and fits.mean() < self._spec.slip_share
+        if slipped:
+            self.state.disturb(self._slip_noise())
+            fits = self.state.squared_distances(seen) <= self._threshold
+        if self._spec.association_check == "none" or fits.sum() < 2:
+            return slipped, fits
+        candidates = seen.take(fits)
+        _, S = self.state.joint(candidates)
+        support = np.empty(len(candidates))
+        slam_kernels.consensus(S, candidates.r, self._threshold, support)
+        together = np.zeros(len(seen), dtype=bool)
+        together[np.flatnonzero(fits)[support > 0]] = True
+        return slipped, together
+
+    def _slip_noise(self) -> Array:
+        """Give the noise of a step that is believed to within its own length only."""
+        spec, sizes = self._spec, np.linalg.norm(self._twist.reshape(2, 3), axis=1)
+        least = spec.slip_sigma_m, spec.slip_sigma_rad
+        return np.diag(np.repeat(np.maximum(sizes, least), 3))
+
+    def _correct(self, seen: Innovations) -> float:
+        PH_T, S = self.state.joint(seen)
+        nis = self.state.correct(seen, PH_T, S)
+        if self._spec.coupling != "coupled":
+            self.state.decouple(self._spec.coupling == "decoupled_pose_kept")
+        return nis
+
+    def _renew(self, landmark_id: Ints, stereo_px: Array, variance: Array) -> tuple[int, int]:
+        """Let landmarks leave and enter; gives how many entered and left."""
+        misfit = np.flatnonzero(self.landmarks.misfits >= self._spec.misfits_max)
+        self.state.leave(misfit)
+        admitted = self._policy.admit(landmark_id)
+        if self._standing:
+            self.state.enter(landmark_id, stereo_px, variance)
+            return len(landmark_id), len(misfit)
+        entering = np.flatnonzero(admitted)
+        if isinstance(self._spec.retention, BoundedQueue):
+            entering = entering[: self._spec.retention.size]
+        gone = self._leaving(len(entering))
+        self.state.leave(gone)
+        self.state.enter(landmark_id[entering], stereo_px[entering], variance[entering])
+        return len(entering), len(gone) + len(misfit)
+
+    def _leaving(self, entering: int) -> Ints:
+        retention, variance = self._spec.retention, None
+        if isinstance(retention, BoundedQueue) and retention.leave == "least_confidence":
+            variance = self.state.landmark_variance()
+        if self._spec.anchors is not None:
+            self.state.leave(expired_anchors(self.landmarks, self._spec.anchors))
+        return self._policy.leaving(self.landmarks, entering, variance)
+
+    def _note(self, **values: float) -> None:
+        for name, value in values.items():
+            self._log[name].append(float(value))
+
+
+def _step(
+    odometry: OdometryStream | None, k: int, poses: list[SE3], spec: SlamSpec
+) -> tuple[Array, Array]:
+    """Give the motion to an image and what unit noises do to it."""
+    if odometry is not None:
+        twist = odometry.twist[k]
+        return twist, np.vstack(
+            [np.diag(np.sqrt(odometry.variance[k])), odometry.scale_sigma[k] * twist]
+        )
+    if k == 0:
+        return np.zeros(6), np.zeros((0, 6))
+    held = (poses[-2].inverse() @ poses[-1]).log() if k > 1 else np.zeros(6)
+    return held, np.diag(np.repeat([spec.free_sigma_m, spec.free_sigma_rad], 3))
