@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.io import loadmat
+from scipy.io.matlab import MatReadError
 
 from lpet_sim.errors import RecordingError
 from lpet_sim.geometry import SE3, so3
@@ -189,7 +190,7 @@ def _load(path: Path) -> dict[str, Array]:
     file = path / FILE if path.is_dir() else path
     try:
         held: dict[str, Any] = loadmat(file)
-    except (OSError, ValueError, NotImplementedError) as error:
+    except (OSError, ValueError, NotImplementedError, MatReadError) as error:
         raise RecordingError(
             f"cannot read {file}: {error}; give the folder of Starry Night, with {FILE}"
         ) from None
