@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 
 from lpet_sim.cli_rig import rig_app
+from lpet_sim.cli_sweep import sweep
 from lpet_sim.errors import LpetError
 from lpet_sim.terminal import bar, print_tables, wrote
 
@@ -27,6 +28,7 @@ import_app = typer.Typer(
 )
 app.add_typer(import_app, name="import")
 app.add_typer(rig_app, name="rig")
+app.command()(sweep)
 
 RecordingArgument = Annotated[Path, typer.Argument(metavar="RUN.rrd", help="A recording.")]
 SeedOption = Annotated[int, typer.Option(help="Seed of everything random.")]
@@ -78,6 +80,26 @@ def sight(
     front_end = FrontEndSpec() if spec is None else FrontEndSpec.from_yaml(spec)
     with bar(f"sighting {run.name}") as progress:
         summary = sight_recording(run, out or run, front_end, progress)
+    typer.echo(str(summary))
+    wrote(out or run)
+
+
+@app.command()
+def sense(
+    run: RecordingArgument,
+    spec: Annotated[Path | None, typer.Option(help="YAML of the landmark sensor.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of landmarks and noise; the traverse's if absent.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Write here, not in place.")] = None,
+) -> None:
+    """Sense landmarks along a simulated traverse, without images."""
+    from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec
+    from lpet_sim.sweep.sensing import sense_file
+
+    sensor = LandmarkSensorSpec() if spec is None else LandmarkSensorSpec.from_yaml(spec)
+    with bar(f"sensing {run.name}") as progress:
+        summary = sense_file(run, out or run, sensor, seed, progress)
     typer.echo(str(summary))
     wrote(out or run)
 

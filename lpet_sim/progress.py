@@ -8,12 +8,20 @@ from typing import TypeVar
 Progress = Callable[[float], None]
 """Called with the fraction done, from 0 to 1."""
 
+Count = Callable[[int, int, int], None]
+"""Called with the things done, all things, and how many of those done failed."""
+
 T = TypeVar("T")
 
 
 def silent(fraction: float) -> None:
     """Listen to nothing."""
     del fraction
+
+
+def uncounted(done: int, total: int, failed: int) -> None:
+    """Count nothing."""
+    del done, total, failed
 
 
 def track(items: Iterable[T], total: int, progress: Progress) -> Iterator[T]:

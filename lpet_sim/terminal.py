@@ -7,11 +7,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.progress import Progress as ProgressBar
 from rich.table import Table
 
-from lpet_sim.progress import Progress
+from lpet_sim.progress import Count, Progress
 
 _FILE_WIDTH = 140
 
@@ -25,6 +31,27 @@ def bar(title: str) -> Iterator[Progress]:
     with ProgressBar(*columns, TimeElapsedColumn(), console=console, disable=hidden) as shown:
         task = shown.add_task(title, total=1.0)
         yield lambda fraction: shown.update(task, completed=fraction)
+
+
+@contextmanager
+def two_bars(first: str, second: str) -> Iterator[tuple[Progress, Count]]:
+    """Show two bars on stderr while the block runs: a share, and things that are counted.
+
+    Gives what is to be called with the fraction done of the first, and what is to be called with
+    the things done, all things, and the failures among those done.
+    """
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}"))
+    console = Console(stderr=True)
+    hidden, times = not console.is_terminal, (TimeElapsedColumn(), TimeRemainingColumn())
+    with ProgressBar(*columns, *times, console=console, disable=hidden) as shown:
+        share = shown.add_task(first, total=1.0, said="")
+        counted = shown.add_task(second, total=None, said="")
+
+        def count(done: int, total: int, failed: int) -> None:
+            said = f"{done}/{total}, {failed} failed"
+            shown.update(counted, completed=done, total=total, said=said)
+
+        yield lambda fraction: shown.update(share, completed=fraction), count
 
 
 def print_tables(tables: Iterable[Table]) -> None:

@@ -33,6 +33,7 @@ MAY_IMPORT["sweep"] = {*MAY_IMPORT} - {"sweep"}
 MAY_IMPORT["tradeoff"] = {*MAY_IMPORT}
 MAY_IMPORT["study"] = {*MAY_IMPORT}
 MAY_IMPORT["cli_rig"] = {*MAY_IMPORT} - {"study"}
+MAY_IMPORT["cli_sweep"] = {*MAY_IMPORT} - {"study", "cli_rig"}
 MAY_IMPORT["cli"] = {*MAY_IMPORT}
 """Which rooms each room may import, besides itself."""
 
@@ -52,7 +53,9 @@ QUARANTINE: dict[str, set[str]] = {
     "trimesh": {"lpet_sim/terrain/rock_shapes.py"},
     "rasterio": {"lpet_sim/terrain/dem.py"},
     "gtsam": {"estimators/peers/library.py"},
-    "typer": {"lpet_sim/cli.py", "lpet_sim/cli_rig.py"},
+    "distributed": {"lpet_sim/sweep/sweep_pool.py"},
+    "joblib": {"lpet_sim/sweep/sweep_pool.py"},
+    "typer": {"lpet_sim/cli.py", "lpet_sim/cli_rig.py", "lpet_sim/cli_sweep.py"},
 }
 """The files that may import a library, so that its upgrade touches one room."""
 

@@ -87,11 +87,21 @@ class TraverseSpec(Spec):
         Raises:
             SpecError: The file is missing, is not YAML, or holds an unknown key or a bad value.
         """
-        mapping, folder = read_yaml(Path(path)), Path(path).parent
-        if isinstance(mapping, dict) and "terrain" in mapping:
-            mapping |= {"terrain": _beside(mapping["terrain"], folder)}
-        _find_rock(mapping, folder)
+        mapping = files_beside(read_yaml(Path(path)), Path(path).parent)
         return cls.from_mapping(mapping, source=str(path))
+
+
+def files_beside(mapping: object, folder: Path) -> object:
+    """Find the files that a traverse as read from YAML names, where they lie in its folder.
+
+    Args:
+        mapping: The traverse, not yet validated.
+        folder: Where its YAML file lies.
+    """
+    if isinstance(mapping, dict) and "terrain" in mapping:
+        mapping |= {"terrain": _beside(mapping["terrain"], folder)}
+    _find_rock(mapping, folder)
+    return mapping
 
 
 def _beside(terrain: object, folder: Path) -> object:

@@ -1,0 +1,147 @@
+"""One job of a sweep: a data set in one arm is read and sensed once, then runs every variant."""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from estimators.odometry_steps import image_odometry
+from lpet_sim.errors import RecordingError
+from lpet_sim.evaluation.bounds import end_bound
+from lpet_sim.recording.reader import read_recording
+from lpet_sim.recording.streams import Measurements
+from lpet_sim.sweep.miscalibration import miscalibrate
+from lpet_sim.sweep.sensing import sense_recording
+from lpet_sim.sweep.sweep_once import PlannedRun, RunSettings, Scene, run_row, said
+from lpet_sim.sweep.sweep_spec import ArmSpec
+from lpet_sim.sweep.sweep_store import Journal, RowStore
+
+_log = logging.getLogger(__name__)
+_ORPHAN_S = 0.25
+_WATCH = "orphan watch"
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One data set in one arm. It has slots so that Dask ships it with its task, not apart from it.
+
+    Attributes:
+        key: Names what its runs have in common.
+        recording: The data set.
+        arm: How it is sensed.
+        runs: What to run on it.
+        settings: What all runs have in common.
+        bound: Whether to compute its Cramer-Rao bound.
+    """
+
+    key: str
+    recording: Path
+    arm: ArmSpec
+    runs: tuple[PlannedRun, ...]
+    settings: RunSettings
+    bound: bool = False
+
+
+def run_job(job: Job) -> int:
+    """Run what is missing of a job, and add each row to the sweep's store as its run ends.
+
+    Returns:
+        How many runs were run.
+    """
+    if job.settings.is_local:
+        _end_with_parent()
+    store = RowStore(job.settings.folder).refresh(job.key)
+    missing = store.missing([run.key for run in job.runs], job.settings.redo)
+    todo = [run for run in job.runs if run.key in missing]
+    wants_bound = job.bound and job.key not in store.bounds
+    if todo or wants_bound:
+        with Journal(job.settings.folder, job.key) as journal:
+            _run_all(job, todo, wants_bound, journal)
+    return len(todo)
+
+
+def _run_all(job: Job, todo: Sequence[PlannedRun], wants_bound: bool, journal: Journal) -> None:
+    scene: Scene | str
+    try:
+        scene = prepare(job.recording, job.arm, job.settings.odometry)
+    except Exception as error:
+        _log.debug("job %s", job.key, exc_info=True)
+        scene = f"before the run: {said(error)}"
+    for run in todo:
+        journal.start(run.key, job.settings.driver)
+        journal.row(run_row(run, scene, job.settings))
+    if wants_bound:
+        journal.bound(job.key, bound_of(scene))
+
+
+def prepare(path: Path, arm: ArmSpec, odometry: str) -> Scene:
+    """Read a recording, sense it as the arm says, and give it odometry at its images.
+
+    Args:
+        path: The recording.
+        arm: How it is sensed.
+        odometry: ``fused`` or ``wheels``.
+
+    Raises:
+        LpetError: It cannot be read or sensed so, or holds no truth.
+    """
+    recording = read_recording(path)
+    measurements, truth = recording.measurements, recording.truth
+    if truth is None:
+        raise RecordingError(f"{path} holds no truth to score against; give one that does")
+    if arm.sensor is not None:
+        sensed = sense_recording(recording, arm.sensor)
+        measurements = replace(measurements, sightings=sensed, images=None)
+    if arm.declared is not None:
+        measurements = miscalibrate(measurements, arm.declared)
+    measurements = _with_odometry(measurements, odometry)
+    seen = measurements.sightings or measurements.images
+    return Scene(measurements, truth, 0 if seen is None else len(seen))
+
+
+def _with_odometry(measurements: Measurements, kind: str) -> Measurements:
+    """Give the increments from image to image, where there is anything to make them of."""
+    sightings = measurements.sightings
+    if sightings is None or (measurements.odometry is None and measurements.wheels is None):
+        return measurements
+    heard = replace(measurements, imu=None) if kind == "wheels" else measurements
+    return replace(measurements, odometry=image_odometry(heard, sightings.t_ns))
+
+
+def bound_of(scene: Scene | str) -> dict[str, Any]:
+    """Give the Cramer-Rao bound of a job, or NaN with the reason why there is none."""
+    none = {"bound_m": math.nan, "bound_rad": math.nan}
+    if isinstance(scene, str):
+        return none | {"text": scene}
+    told = scene.measurements
+    if told.sightings is None or told.calibration.stereo is None:
+        return none | {"text": "there are no sightings of a declared stereo camera"}
+    try:
+        at_images = scene.truth.trajectory.at(told.sightings.t_ns)
+        bound = end_bound(at_images, told.sightings, told.calibration.stereo, told.odometry)
+    except Exception as error:
+        _log.warning("no bound: %s", said(error))
+        return none | {"text": said(error)}
+    rms = {"bound_m": bound.position_rms_m, "bound_rad": bound.attitude_rms_rad}
+    return rms | {"text": ""}
+
+
+def _end_with_parent() -> None:
+    """End this process when the driver is gone: nobody would know what it still does."""
+    if _WATCH in (thread.name for thread in threading.enumerate()):
+        return
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_ORPHAN_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, name=_WATCH, daemon=True).start()
