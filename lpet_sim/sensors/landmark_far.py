@@ -103,7 +103,8 @@ class FarField:
         width = self._first_cell_m * 2.0 ** ring[:, None]
         centre = (cell + self._lattice[slot, ring] + 0.5) * width
         bearing = 2.0 * math.pi * (slot + jitter) / max(self._slots, 1)
-        xy = self._highest(centre, bearing, self._first_range_m * 2.0**ring)
+        inner_m = np.asarray(self._first_range_m * 2.0**ring)
+        xy = self._highest(centre, bearing, inner_m)
         p_world = np.column_stack([xy, self._terrain.height(xy)])
         landmarks = looks(FAR, p_world, self._terrain.normal(xy), state)
         return FarLandmarks(landmarks, stations, self._lattice, self._first_cell_m)

@@ -113,7 +113,7 @@ def image_times(truth: BodyTruth, period_s: float) -> Ints:
 
 
 def true_camera(calibration: StereoCalibration, spec: LandmarkSensorSpec) -> StereoCalibration:
-    """Give the pair as it truly is: ``declared = true (1 + error)`` for focal length and baseline."""
+    """Give the pair as it truly is: for both its scales ``declared = true (1 + error)``."""
     return calibration.model_copy(
         update={
             "focal_px": calibration.focal_px / (1.0 + spec.focal_scale_error),

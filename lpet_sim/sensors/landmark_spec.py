@@ -29,8 +29,8 @@ class LandmarkFieldSpec(Spec):
         far_from_m: Relief is far from here on [m].
     """
 
-    ground_per_m2: Density = 2.0
-    per_rock: Density = 1.5
+    ground_per_m2: Density = 3.0
+    per_rock: Density = 2.5
     rock_min_diameter_m: Positive = 0.1
     far_per_rad: NotNegative = 12.0
     far_from_m: Positive = 60.0
@@ -64,7 +64,7 @@ class VisibilitySpec(Spec):
     range_exponent: NotNegative = 2.0
     incidence_max_rad: Annotated[float, Field(gt=0.0, le=math.pi / 2)] = math.radians(86.0)
     occlusion: bool = True
-    sightings_max: Annotated[int, Field(ge=1)] | None = 50
+    sightings_max: Annotated[int, Field(ge=1)] | None = 60
 
 
 class SightingNoiseSpec(Spec):

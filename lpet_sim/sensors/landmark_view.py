@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from scipy.spatial import cKDTree
 
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import Array, Ints
@@ -70,15 +71,17 @@ class LandmarkView:
         """
         xy = T_world_camera.translation[:, :2]
         for begin, end in blocks(xy):
-            box = _box_around(xy[begin:end])
-            block = self._gathered(box)
+            block = self._gathered(xy[begin:end])
             for n in range(begin, end):
                 yield block.show(T_world_camera.rotation[n], T_world_camera.translation[n])
 
-    def _gathered(self, box: Box) -> _Block:
-        """Gather all that can be seen, or can hide, from any place in a box."""
+    def _gathered(self, xy: Array) -> _Block:
+        """Gather all that can be seen, or can hide, from some places."""
+        box = _box_around(xy)
         far = self._far.near(box)
         near = self._field.near(box.grown(self._spec.range_max_m))
+        distance, _ = cKDTree(xy).query(near.p_world[:, :2])
+        near = near.select(distance <= _reach_m(near, self._spec))
         both = near.joined(far.landmarks)
         # By strength: an image that shows enough need not look at the rest.
         order = np.lexsort((both.id, -both.strength))
