@@ -113,7 +113,7 @@ def pose_bounds(
     _, by_landmark, by_camera = in_view(rows, T_world_camera, landmarks, calibration)
     by_body = by_camera @ calibration.T_body_camera.se3().inverse().adjoint()
     sigma = rows.sigma_px[:, None, None]
-    known = _Information(rows, by_landmark / sigma, by_body / sigma, _scales(odometry))
+    known = _Information(rows, by_landmark / sigma, by_body / sigma, _has_scale(odometry))
     bounds = {}
     for image, state in enumerate(known.over_time(_steps(truth_poses, odometry))):
         if image in wanted:
@@ -164,10 +164,10 @@ def _landmarks(
 
 @dataclass(frozen=True)
 class _Step:
-    """How the error of a pose becomes that of the next: ``F xi + S s + noise``.
+    """How the error of a pose becomes that of the next: ``F xi + u s + noise``.
 
     Attributes:
-        back: Inverse of the transition of (pose error, scale errors), Shape (6 + c, 6 + c).
+        back: Inverse of the transition of (pose error, scale error), Shape (6 + c, 6 + c).
         variance: Variance of the noise, Shape (6,).
     """
 
@@ -175,29 +175,24 @@ class _Step:
     variance: Array
 
 
-def _scales(odometry: OdometryStream | None) -> Array:
-    """Give the standard deviations of the scale errors that there are, Shape (c,)."""
-    if odometry is None or len(odometry) == 0:
-        return np.zeros(0)
-    sigma = odometry.scale_sigma[0]
-    return np.asarray(sigma[sigma > 0])
+def _has_scale(odometry: OdometryStream | None) -> bool:
+    return odometry is not None and bool(np.any(odometry.scale_sigma[:1] > 0))
 
 
 def _steps(truth_poses: SE3, odometry: OdometryStream | None) -> Iterator[_Step]:
     """Give the steps between the images.
 
-    ``T_next = T T_prev_curr``, so ``xi_next = Ad(T_prev_curr^-1) xi + d + diag(u) s``.
+    ``T_next = T T_prev_curr``, so ``xi_next = Ad(T_prev_curr^-1) xi + d + diag(scale_sigma) u s``
+    with one relative error s of unit variance for all parts and steps.
     """
-    n = len(truth_poses)
     T_prev_curr = truth_poses[:-1].inverse() @ truth_poses[1:]
     twist = T_prev_curr.log()
     forward = T_prev_curr.adjoint()  # The inverse of Ad(T_prev_curr^-1).
-    scaled = np.flatnonzero(odometry.scale_sigma[0] > 0) if odometry is not None else np.zeros(0)
-    for k in range(n - 1):
-        back = np.eye(_POSE + len(scaled))
+    for k in range(len(twist)):
+        back = np.eye(_POSE + _has_scale(odometry))
         back[:_POSE, :_POSE] = forward[k]
-        for column, part in enumerate(scaled.astype(int)):
-            back[:_POSE, _POSE + column] = -forward[k][:, part] * twist[k, part]
+        if odometry is not None and _has_scale(odometry):
+            back[:_POSE, _POSE] = -forward[k] @ (odometry.scale_sigma[k + 1] * twist[k])
         yield _Step(back, _ANYWHERE if odometry is None else odometry.variance[k + 1])
 
 
@@ -208,19 +203,18 @@ class _Information:
     from its first sighting to its last.
     """
 
-    def __init__(self, rows: Rows, G: Array, J: Array, scale_sigma: Array) -> None:
+    def __init__(self, rows: Rows, G: Array, J: Array, has_scale: bool) -> None:
         """Start with the known pose and no landmark.
 
         Args:
             rows: Sightings in order of the images, m.
             G: Their derivatives by the landmark over their noise, Shape (m, 3, 3).
             J: Their derivatives by the pose of the body over their noise, Shape (m, 3, 6).
-            scale_sigma: Standard deviations of the scale errors, Shape (c,).
+            has_scale: Whether the odometry has a scale error.
         """
         self._rows, self._G, self._J = rows, G, J
-        self._head = _POSE + len(scale_sigma)
-        start = np.concatenate([np.full(_POSE, START_VARIANCE), scale_sigma**2])
-        self._matrix = np.diag(1.0 / start)
+        self._head = _POSE + has_scale
+        self._matrix = np.diag(np.repeat([1.0 / START_VARIANCE, 1.0], [_POSE, has_scale]))
         self._slot = np.full(len(rows.landmark_id), -1)
         last = np.zeros(len(rows.landmark_id), dtype=np.int64)
         np.maximum.at(last, rows.landmark, rows.image)
