@@ -84,7 +84,8 @@ def _first_problem(cls: type[BaseModel], error: ValidationError) -> str:
         return (f"'{where}': " if where else "") + str(problem["ctx"]["error"])
     if problem["type"] in _NO_MAPPING:
         said = f"'{where or 'spec'}': must be a mapping of keys to values{_given(problem)}"
-        keys = inside[0].model_fields if len(inside) == 1 else ()
+        named = problem["type"] == "dict_type"
+        keys = inside[0].model_fields if len(inside) == 1 and not named else ()
         return f"{said}; valid keys are {', '.join(keys)}" if keys else said
     return f"'{where or 'spec'}': {problem['msg']}{_given(problem)}"
 
@@ -117,7 +118,8 @@ def _follow(
         if isinstance(part, str) and inside:
             owner = inside[0]
             field = owner.model_fields.get(part)
-            inside = _models_in(field.annotation) if field is not None else []
+            # What is no field is a name in a mapping of models, or unknown: the models stay.
+            inside = _models_in(field.annotation) if field is not None else inside
     return owner, inside, ".".join(keys)
 
 

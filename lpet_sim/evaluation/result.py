@@ -26,7 +26,8 @@ from lpet_sim.spec import Spec
 Triple = tuple[float, float, float]
 INCOMPLETE, DIVERGED, NOT_FINITE = "incomplete", "diverged", "not_finite"
 BAD_COVARIANCE, LOST, EXCEPTION = "bad_covariance", "lost", "exception"
-BROKEN = frozenset({NOT_FINITE, BAD_COVARIANCE, LOST, EXCEPTION})
+TIMEOUT = "timeout"
+BROKEN = frozenset({NOT_FINITE, BAD_COVARIANCE, LOST, EXCEPTION, TIMEOUT})
 """Failures that no small error makes up for."""
 
 
@@ -56,8 +57,9 @@ class RunResult:
         name: The estimator's name.
         distance_m: Length of the part of the traverse that is scored [m].
         completion: Share of that distance that the estimate covers.
-        failure: None, or the first that applies of ``exception``, ``not_finite``, ``incomplete``,
-            ``bad_covariance``, ``lost`` and ``diverged``.
+        failure: None, or the first that applies of ``exception``, ``timeout`` (in a sweep that
+            sets a time limit), ``not_finite``, ``incomplete``, ``bad_covariance``, ``lost`` and
+            ``diverged``.
         failure_text: One sentence on the failure.
         endpoint_error_m: ``p_est - p_true`` at the last estimate, in the world [m].
         endpoint_ratio: Its length over the distance driven by then.

@@ -16,7 +16,7 @@ from estimators import build_estimator
 from lpet_sim.errors import BrokenFilterError
 from lpet_sim.evaluation import EvaluationSpec, Requirement, RunResult, evaluate, failed
 from lpet_sim.evaluation.errors import distance_driven_m
-from lpet_sim.evaluation.result import BAD_COVARIANCE, EXCEPTION
+from lpet_sim.evaluation.result import BAD_COVARIANCE, EXCEPTION, TIMEOUT
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.streams import Measurements
 from lpet_sim.recording.truth import Truth
@@ -26,7 +26,7 @@ from lpet_sim.sweep.sweep_row import (
     variant_columns,
     verdict_columns,
 )
-from lpet_sim.sweep.sweep_store import TIMEOUT, Redo, Row
+from lpet_sim.sweep.sweep_store import Redo, Row
 from lpet_sim.sweep.time_limit import TimeLimitError, time_limit
 
 _log = logging.getLogger(__name__)

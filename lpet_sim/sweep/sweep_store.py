@@ -19,11 +19,8 @@ from typing import Any, Final, Self
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from lpet_sim.evaluation.result import EXCEPTION
+from lpet_sim.evaluation.result import EXCEPTION, TIMEOUT
 from lpet_sim.outputs import output_folder, whole_file
-
-TIMEOUT: Final = "timeout"
-"""Kind of failure of a run that was stopped for taking too long."""
 
 TIMING: Final = ("time_total_s", "time_per_image_ms", "cold", "worker", "started_at")
 """Columns in which two runs of the same sweep may differ."""
