@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from lpet_sim.geometry import SE3
-from lpet_sim.recording.arrays import Array, Ints
+from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
 from lpet_sim.recording.calibration import Calibration, PoseSpec, StereoCalibration
 from lpet_sim.recording.streams import (
     Measurements,
@@ -27,7 +27,7 @@ from lpet_sim.recording.streams import (
     SightingStream,
     concatenate_slices,
 )
-from lpet_sim.recording.trajectory import Trajectory
+from lpet_sim.recording.truth import BodyTruth, Truth
 from lpet_sim.rng import stream
 from lpet_sim.spec import Spec
 
@@ -109,13 +109,18 @@ class SCurveRun:
 
     Attributes:
         measurements: Sightings, odometry, calibration and start.
-        truth: The body's poses at the images.
+        truth: The body's motion, at the times of the images.
         p_world_landmark: The landmarks' places in the order of their names [m], Shape (n, 3).
     """
 
     measurements: Measurements
-    truth: Trajectory
+    truth: Truth
     p_world_landmark: Array
+
+    @property
+    def poses(self) -> SE3:
+        """The body's true poses at the images."""
+        return self.truth.body.T_world_body
 
     @property
     def sightings(self) -> SightingStream:
@@ -169,7 +174,15 @@ def s_curve_run(spec: SCurveSpec, seed: int) -> SCurveRun:
         sightings=_sight(spec, t_ns, poses, landmarks, stream(seed, "s_curve", "sightings")),
         odometry=_measure_odometry(spec, t_ns, poses, stream(seed, "s_curve", "odometry")),
     )
-    return SCurveRun(measurements, Trajectory(t_ns, poses), landmarks)
+    return SCurveRun(measurements, Truth(_motion(t_ns, poses)), landmarks)
+
+
+def _motion(t_ns: Ints, poses: SE3) -> BodyTruth:
+    """Give the motion through the poses, with the mean velocity around each."""
+    t_s = t_ns / NS_PER_S
+    velocity = np.gradient(poses.translation, t_s, axis=0)
+    rate = (poses[:-1].inverse() @ poses[1:]).log()[:, 3:] / np.diff(t_s)[:, None]
+    return BodyTruth(t_ns, poses, velocity, np.concatenate([rate, rate[-1:]]))
 
 
 def _landmarks(spec: SCurveSpec, poses: SE3, rng: np.random.Generator) -> Array:

@@ -44,7 +44,7 @@ def run() -> SCurveRun:
 def bound_of(run: SCurveRun, with_odometry: bool = True) -> PoseBound:
     """Give the bound at the end with the landmarks as they are."""
     odometry = run.odometry if with_odometry else None
-    return end_bound(run.truth.T_world_body, run.sightings, CAMERA, odometry, run.p_world_of)
+    return end_bound(run.poses, run.sightings, CAMERA, odometry, run.p_world_of)
 
 
 def residuals(run: SCurveRun, rows: Rows, state: Array) -> Array:
@@ -52,10 +52,10 @@ def residuals(run: SCurveRun, rows: Rows, state: Array) -> Array:
 
     Written plainly: landmarks are points in the world here, poses move by ``T exp(xi)``.
     """
-    n = len(run.truth)
+    n = len(run.poses)
     xi = np.concatenate([np.zeros((1, 6)), state[: 6 * (n - 1)].reshape(-1, 6)])
     scale, p = state[6 * (n - 1)], state[6 * (n - 1) + 1 :].reshape(-1, 3)
-    poses = run.truth.T_world_body @ SE3.exp(xi)
+    poses = run.poses @ SE3.exp(xi)
     camera = (poses @ CAMERA.T_body_camera.se3())[rows.image]
     p_world = run.p_world_landmark[rows.landmark_id] + p
     seen = CAMERA.project(camera.inverse() @ p_world[rows.landmark])
@@ -71,7 +71,7 @@ def residuals(run: SCurveRun, rows: Rows, state: Array) -> Array:
 
 def size_of(run: SCurveRun, rows: Rows) -> int:
     """Give the number of unknowns of `residuals`."""
-    return 6 * (len(run.truth) - 1) + 1 + 3 * len(rows.landmark_id)
+    return 6 * (len(run.poses) - 1) + 1 + 3 * len(rows.landmark_id)
 
 
 def test_the_bound_is_the_inverse_of_the_dense_normal_matrix(run: SCurveRun) -> None:
@@ -82,7 +82,7 @@ def test_the_bound_is_the_inverse_of_the_dense_normal_matrix(run: SCurveRun) -> 
     exact = without_noise(run)
     rows = Rows.of(exact.sightings)
     J = numerical_jacobian(lambda x: residuals(exact, rows, x), np.zeros(size_of(run, rows)), 1e-5)
-    last = slice(6 * (len(run.truth) - 2), 6 * (len(run.truth) - 1))
+    last = slice(6 * (len(run.poses) - 2), 6 * (len(run.poses) - 1))
     expected = np.linalg.inv(J.T @ J)[last, last]
     found = bound_of(run).covariance
     scale = np.sqrt(np.diag(expected))
@@ -93,7 +93,7 @@ def test_the_bound_is_the_inverse_of_the_dense_normal_matrix(run: SCurveRun) -> 
 
 def without_noise(run: SCurveRun) -> SCurveRun:
     """Replace what was measured by what is true."""
-    true = (run.truth.T_world_body[:-1].inverse() @ run.truth.T_world_body[1:]).log()
+    true = (run.poses[:-1].inverse() @ run.poses[1:]).log()
     twist = np.concatenate([np.zeros((1, 6)), true])
     odometry = replace(run.odometry, twist=twist)
     return replace(run, measurements=replace(run.measurements, odometry=odometry))
@@ -102,7 +102,7 @@ def without_noise(run: SCurveRun) -> SCurveRun:
 def test_without_sightings_the_bound_is_the_odometrys_noise() -> None:
     """Without sightings the covariance of a chain is the sum of moved steps, scale and all."""
     run = s_curve_run(SPEC, 2)
-    poses, t_ns = run.truth.T_world_body, run.odometry.t_ns
+    poses, t_ns = run.poses, run.odometry.t_ns
     nothing = SightingStream(
         t_ns, np.zeros(len(t_ns) + 1, dtype=np.int64), np.zeros(0, dtype=np.int64),
         np.zeros((0, 3)), np.zeros(0),
@@ -149,7 +149,7 @@ def test_the_bound_falls_with_every_sighting_and_with_odometry(run: SCurveRun) -
     covariances = [
         bound_of(run).covariance,
         bound_of(run, with_odometry=False).covariance,
-        end_bound(run.truth.T_world_body, less, CAMERA, None, run.p_world_of).covariance,
+        end_bound(run.poses, less, CAMERA, None, run.p_world_of).covariance,
     ]
     for better, worse in pairwise(covariances):
         assert np.linalg.eigvalsh(worse - better)[0] > -1e-12
@@ -169,7 +169,7 @@ def test_a_batch_estimator_reaches_the_bound(run: SCurveRun) -> None:
     exact = without_noise(run)
     rows = Rows.of(exact.sightings)
     true_px = CAMERA.project(
-        (exact.truth.T_world_body @ CAMERA.T_body_camera.se3())[rows.image].inverse()
+        (exact.poses @ CAMERA.T_body_camera.se3())[rows.image].inverse()
         @ exact.p_world_landmark[rows.landmark_id][rows.landmark]
     )
     rng, draws, size = stream(5, "batch"), 200, size_of(run, rows)
@@ -180,7 +180,7 @@ def test_a_batch_estimator_reaches_the_bound(run: SCurveRun) -> None:
         noisy = true_px + rows.sigma_px[:, None] * rng.standard_normal(true_px.shape)
         seen = replace(rows, stereo_px=noisy)
         noise = np.sqrt(exact.odometry.variance[1:]) * rng.standard_normal(
-            (len(exact.truth) - 1, 6)
+            (len(exact.poses) - 1, 6)
         )
         scaled = exact.odometry.twist[1:].copy()
         scaled[:, 0] *= 1 + SPEC.scale_sigma * rng.standard_normal()
@@ -190,7 +190,7 @@ def test_a_batch_estimator_reaches_the_bound(run: SCurveRun) -> None:
         x = np.zeros(size)
         for _ in range(3):
             x = x - solve @ residuals(world, seen, x)
-        errors.append(x[6 * (len(run.truth) - 2) : 6 * (len(run.truth) - 1)])
+        errors.append(x[6 * (len(run.poses) - 2) : 6 * (len(run.poses) - 1)])
     found, e = bound_of(run), np.array(errors)
     nees = np.einsum("ni,ij,nj->n", e, np.linalg.inv(found.covariance), e).mean()
     low, high = chi_square_band(draws, 6, 0.99)
@@ -202,7 +202,7 @@ def test_a_batch_estimator_reaches_the_bound(run: SCurveRun) -> None:
 def test_landmarks_triangulated_at_the_truth_give_the_same_bound(run: SCurveRun) -> None:
     """Their error moves the derivatives a little, and the bound by less than a hundredth."""
     known = bound_of(run)
-    found = end_bound(run.truth.T_world_body, run.sightings, CAMERA, run.odometry)
+    found = end_bound(run.poses, run.sightings, CAMERA, run.odometry)
     assert found.position_rms_m == pytest.approx(known.position_rms_m, rel=0.01)
     assert found.attitude_rms_rad == pytest.approx(known.attitude_rms_rad, rel=0.01)
 
@@ -217,7 +217,7 @@ def test_outliers_are_left_out(run: SCurveRun) -> None:
     sound = SightingStream(
         spoilt.t_ns, offsets, spoilt.landmark_id[~wrong], px[~wrong], spoilt.sigma_px[~wrong]
     )
-    poses = run.truth.T_world_body
+    poses = run.poses
     expected = end_bound(poses, sound, CAMERA, run.odometry).position_rms_m
     found = end_bound(poses, spoilt, CAMERA, run.odometry).position_rms_m
     assert found == pytest.approx(expected, rel=0.01)
@@ -227,7 +227,7 @@ def test_outliers_are_left_out(run: SCurveRun) -> None:
 
 def test_landmarks_at_the_horizon_carry_attitude_and_no_place(run: SCurveRun) -> None:
     """Three of them, with disparities that noise makes negative, pin the attitude alone."""
-    poses, rng = run.truth.T_world_body, stream(3, "horizon")
+    poses, rng = run.poses, stream(3, "horizon")
     p_world = np.array([[5e4, y, 2e3] for y in (-1e4, 0.0, 1e4)])
     camera = poses @ CAMERA.T_body_camera.se3()
     px = np.concatenate([CAMERA.project(camera[k].inverse() @ p_world) for k in range(len(poses))])
@@ -251,7 +251,7 @@ def test_the_derivatives_are_those_of_the_projection(run: SCurveRun) -> None:
     x = np.array([500.0, 470.0, 300.0])
     assert_jacobian(lambda y: homogeneous(CAMERA, y), x, homogeneous_jacobian(CAMERA))
     rows = Rows.of(run.sightings)
-    T_world_camera = run.truth.T_world_body @ CAMERA.T_body_camera.se3()
+    T_world_camera = run.poses @ CAMERA.T_body_camera.se3()
     landmarks, _ = triangulate(rows, T_world_camera, CAMERA)
     _, G, J = in_view(rows, T_world_camera, landmarks, CAMERA)
     for row in (0, 40, 90):
@@ -269,7 +269,7 @@ def test_the_derivatives_are_those_of_the_projection(run: SCurveRun) -> None:
 def test_a_triangulated_landmark_is_where_it_was_seen_exactly(run: SCurveRun) -> None:
     """Without noise it comes back to where it is."""
     rows = Rows.of(run.sightings)
-    T_world_camera = run.truth.T_world_body @ CAMERA.T_body_camera.se3()
+    T_world_camera = run.poses @ CAMERA.T_body_camera.se3()
     p_world = run.p_world_landmark[rows.landmark_id][rows.landmark]
     exact = replace(rows, stereo_px=CAMERA.project(T_world_camera[rows.image].inverse() @ p_world))
     found, chi2 = triangulate(exact, T_world_camera, CAMERA)
@@ -279,7 +279,7 @@ def test_a_triangulated_landmark_is_where_it_was_seen_exactly(run: SCurveRun) ->
 
 def test_the_bound_at_a_time_is_that_of_the_run_cut_there(run: SCurveRun) -> None:
     """What comes later does not help."""
-    poses, sightings, odometry = run.truth.T_world_body, run.sightings, run.odometry
+    poses, sightings, odometry = run.poses, run.sightings, run.odometry
     until = 5
     end = int(sightings.offsets[until + 1])
     cut = SightingStream(
@@ -296,13 +296,13 @@ def test_the_bound_at_a_time_is_that_of_the_run_cut_there(run: SCurveRun) -> Non
 def test_a_rover_that_sees_and_measures_nothing_could_be_anywhere(run: SCurveRun) -> None:
     """The bound is then far away, and finite."""
     none = fewer_sightings(run.sightings, 10_000)
-    assert 50.0 < end_bound(run.truth.T_world_body, none, CAMERA).position_rms_m < 1e5
+    assert 50.0 < end_bound(run.poses, none, CAMERA).position_rms_m < 1e5
 
 
 def test_what_is_not_at_the_same_times_is_refused(run: SCurveRun) -> None:
     """Poses and odometry go with the images."""
     with pytest.raises(RecordingError, match="give the pose of each"):
-        end_bound(run.truth.T_world_body[:-1], run.sightings, CAMERA)
+        end_bound(run.poses[:-1], run.sightings, CAMERA)
     shifted = replace(run.odometry, t_ns=run.odometry.t_ns + 1)
     with pytest.raises(RecordingError, match="times of the images"):
-        end_bound(run.truth.T_world_body, run.sightings, CAMERA, shifted)
+        end_bound(run.poses, run.sightings, CAMERA, shifted)
