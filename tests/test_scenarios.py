@@ -120,6 +120,19 @@ def test_rough_ground_is_driven_measured_and_drawn(tmp_path: Path) -> None:
     assert picture.stat().st_size > 10_000
 
 
+def test_a_hundred_metres_begin_and_every_estimator_has_its_line(tmp_path: Path) -> None:
+    """The filter is consistent over its first metres, and one told half the noise is not."""
+    printed = run_quick("hundred_metres.py", tmp_path, "--out", str(tmp_path), "--workers", "1")
+    table, summary = written_by(printed)
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    assert len({row["method"] for row in rows}) == 13 and len(rows) == 3 * 13
+    assert all(row["failure"] == "" for row in rows)
+    lines = [line.split(" | ") for line in summary.read_text().splitlines() if "SLAM" in line]
+    pose = {cells[0].removeprefix("| "): cells[9] for cells in lines}
+    assert pose["SLAM M = 10, right-invariant"].startswith("**")
+    assert not pose["SLAM M = 10, told half the noise"].startswith("**")
+
+
 @pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.stem)
 def test_a_scenario_file_is_a_traverse(path: Path) -> None:
     """It loads, is called what its file is called, and goes to YAML and back unchanged."""
