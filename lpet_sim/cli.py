@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from lpet_sim.cli_report import report
 from lpet_sim.cli_rig import rig_app
 from lpet_sim.cli_sweep import sweep
 from lpet_sim.errors import LpetError
@@ -28,6 +29,7 @@ import_app = typer.Typer(
 )
 app.add_typer(import_app, name="import")
 app.add_typer(rig_app, name="rig")
+app.command()(report)
 app.command()(sweep)
 
 RecordingArgument = Annotated[Path, typer.Argument(metavar="RUN.rrd", help="A recording.")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -97,8 +97,9 @@ def at_equal_size(
     out = []
     for (arm,), group in rows.groups("arm"):
         sized = _with_every_size(group, by)
+        curves = [_curves(sized, family, by, metric) for family in (family_a, family_b)]
         for size in _common_sizes(sized, family_a, family_b, by, points):
-            a, b = (_errors_at(sized, f, by, metric, size) for f in (family_a, family_b))
+            a, b = (_errors_at(of, size) for of in curves)
             if common := [key for key in a if key in b]:
                 x, y = (np.array([e[key] for key in common]) for e in (b, a))
                 ordering = compare_errors(arm, (names[1], names[0]), x, y, tolerance)
@@ -137,18 +138,22 @@ def _with_every_size(rows: Rows, by: Size) -> Rows:
     return rows.with_columns(**{by: size})
 
 
-def _errors_at(
-    rows: Rows, family: Sequence[str], by: Size, metric: str, size: float
-) -> dict[tuple[str, ...], float]:
-    """Interpolate the error of a family at one size, by data set and seed."""
+def _curves(
+    rows: Rows, family: Sequence[str], by: Size, metric: str
+) -> dict[tuple[str, ...], Curve]:
+    """Make the curve of a family on each data set and seed that has one."""
     of = rows.where(np.isin(rows["variant"].astype(str), list(family)))
-    out = {}
-    for key, group in of.groups("data_set", *(["seed"] if "seed" in of else [])):
-        curve = size_curve(group, by, metric)
-        error = np.nan if curve is None else float(curve.at(np.array([size]))[0])
-        if not np.isnan(error):
-            out[key] = error
-    return out
+    groups = of.groups("data_set", *(["seed"] if "seed" in of else []))
+    curves = ((key, size_curve(group, by, metric)) for key, group in groups)
+    return {key: curve for key, curve in curves if curve is not None}
+
+
+def _errors_at(
+    curves: Mapping[tuple[str, ...], Curve], size: float
+) -> dict[tuple[str, ...], float]:
+    """Give the error at one size by data set and seed, where the sweep reaches it."""
+    errors = ((key, float(curve.at(np.array([size]))[0])) for key, curve in curves.items())
+    return {key: error for key, error in errors if not np.isnan(error)}
 
 
 def _common_sizes(

@@ -19,7 +19,7 @@ from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.trajectory import Trajectory
 
 # Okabe and Ito's colours, told apart by the colour-blind too; black is the truth's.
-_COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _DPI = 150
 _Item = TypeVar("_Item")
 
@@ -95,7 +95,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def _coloured(items: Sequence[_Item]) -> list[tuple[_Item, str]]:
-    return [(item, _COLOURS[k % len(_COLOURS)]) for k, item in enumerate(items)]
+    return [(item, COLOURS[k % len(COLOURS)]) for k, item in enumerate(items)]
 
 
 def _draw_path(axes: Axes, path: Trajectory, label: str, colour: str, width: float) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import binomtest, wilcoxon
 
 from lpet_sim.errors import RowsError
@@ -50,6 +51,7 @@ class Ordering:
         p_sign: One-sided p-value of the sign test.
         p_wilcoxon: One-sided p-value of the Wilcoxon signed-rank test.
         tolerance: ``better`` may be worse by this share of its error and the claim still holds.
+        deciding: Interval of the median of ``worse - (1 - tolerance) better``, which decides.
     """
 
     arm: str
@@ -65,20 +67,20 @@ class Ordering:
     ties: int
     p_sign: float
     p_wilcoxon: float
-    tolerance: float = 0.0
+    tolerance: float
+    deciding: Interval
 
     @property
     def verdict(self) -> Decision:
         """What the intervals say.
 
-        ``holds`` where the interval of the median difference lies above zero, unless the ratio of
-        the RMS errors says the opposite by its own interval; ``does not hold`` where it lies below
-        zero; else ``not decided``. With a tolerance both are of ``better`` made so much smaller.
+        ``holds`` where the deciding interval lies above zero, unless the ratio of the RMS errors
+        says the opposite by its own; ``does not hold`` where it lies below; else ``not decided``.
         """
-        if self.median_difference.high < 0:
+        if self.deciding.high < 0:
             return "does not hold"
-        reversed_in_rms = self.rms_ratio_completed.high < 1
-        if self.median_difference.low > 0 and not reversed_in_rms:
+        reversed_in_rms = self.rms_ratio_completed.high < 1 - self.tolerance
+        if self.deciding.low > 0 and not reversed_in_rms:
             return "holds"
         return "not decided"
 
@@ -144,8 +146,9 @@ def compare_errors(
         better: Errors of the other on the same data sets, Shape (runs,).
         tolerance: See `Ordering`.
     """
-    a, b = np.asarray(worse, dtype=float), np.asarray(better, dtype=float) * (1 - tolerance)
+    a, b = np.asarray(worse, dtype=float), np.asarray(better, dtype=float)
     difference = _difference(a, b)
+    lenient = difference if tolerance == 0 else _difference(a, b * (1 - tolerance))
     draws = draw_runs(len(a), stream(_SEED, "bootstrap", "pairs", len(a)))
     both = np.isfinite(difference) & np.isfinite(a)
     of_a, of_b = (np.where(both, x, np.nan) for x in (a, b))
@@ -158,7 +161,7 @@ def compare_errors(
         runs=len(a),
         failed_worse=int(np.isinf(a).sum()),
         failed_better=int(np.isinf(b).sum()),
-        median_difference=interval_of(quantile(difference, 0.5), quantile(difference[draws], 0.5)),
+        median_difference=_median(difference, draws),
         mean_difference_completed=float(difference[both].mean()) if both.any() else np.nan,
         rms_ratio_completed=ratio,
         share=pass_rate(wins, wins + losses) if wins + losses else Interval(np.nan, 0.0, 1.0),
@@ -166,7 +169,12 @@ def compare_errors(
         p_sign=_sign_test(wins, losses),
         p_wilcoxon=_wilcoxon(difference),
         tolerance=tolerance,
+        deciding=_median(lenient, draws),
     )
+
+
+def _median(values: Array, draws: NDArray[np.int64]) -> Interval:
+    return interval_of(quantile(values, 0.5), quantile(values[draws], 0.5))
 
 
 def _difference(a: Array, b: Array) -> Array:
