@@ -21,7 +21,7 @@ from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec, VisibilitySpec
 from lpet_sim.terrain.box import Box
 from lpet_sim.terrain.terrain import Terrain
 
-BLOCK_M = 16.0
+BLOCK_M = 40.0
 """Size of the box of places whose landmarks and occluders are gathered at once [m]: memory stays
 flat over a long drive."""
 
