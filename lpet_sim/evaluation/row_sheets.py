@@ -22,7 +22,7 @@ from lpet_sim.evaluation.sheet import (
     shown,
     words,
 )
-from lpet_sim.evaluation.statistics import Interval
+from lpet_sim.evaluation.statistics import RUNS_MIN, Interval
 from lpet_sim.evaluation.summary import NEES_DOF, Efficiency, ErrorSpread, InnovationTest, Summary
 
 _TONES: dict[Outcome | Decision, Tone] = {
@@ -104,7 +104,7 @@ def position_sheet(summaries: Sequence[Summary]) -> Sheet:
     note = (
         "Position error as a share of the distance driven, at the end and at the worst moment "
         f"after the first metres. Median and 95th percentile {_ALL}; RMS over completed runs. "
-        "95 % bootstrap intervals over runs."
+        f"95 % bootstrap intervals over runs, where there are {RUNS_MIN} or more."
     )
     return Sheet("position", "Position error", note, headings, tuple(rows))
 
@@ -277,7 +277,7 @@ def _nees(average: Consistency | None) -> Cell:
 def _innovations(test: InnovationTest | None) -> Cell:
     if test is None:
         return no_value(5)
-    of = interval(test.mean, ".4g", "good" if test.is_consistent else "bad")
+    of = interval(test.mean, "#.4g", "good" if test.is_consistent else "bad")
     return Cell(of.text, (*of.values, test.low, test.high), of.tone)
 
 

@@ -21,6 +21,8 @@ Column = NDArray[Any]
 REQUIRED = ("run", "data_set", "arm", "variant", "failure", "end_percent", "passed")
 """Columns without which a table says nothing about runs."""
 CURVE = "error_curve"
+ORDER = "variant_order"
+"""Column of the place of a variant in the spec of its sweep."""
 IDEAL = "ideal"
 """The arm that tables and figures show first."""
 _ARROW_KEYS = ("ARROW:schema", "pandas")
@@ -70,6 +72,14 @@ class Rows:
         size = np.abs(self.numbers(name))
         return np.where(self.failed | np.isnan(size), np.inf, size)
 
+    def times(self, name: str) -> Array:
+        """Give a column of times, NaN for the cold runs unless all are cold, Shape (runs,).
+
+        A cold run is the first of its estimator in a process, which also compiles and loads.
+        """
+        cold = self["cold"] if "cold" in self else np.zeros(len(self), dtype=bool)
+        return np.where(cold & ~cold.all(), np.nan, self.numbers(name))
+
     def where(self, mask: Column) -> Rows:
         """Give the rows that a mask or indices choose."""
         chosen = {name: column[mask] for name, column in self.columns.items()}
@@ -87,14 +97,25 @@ class Rows:
         return replace(self, columns={**self.columns, **columns})
 
     def groups(self, *names: str) -> Iterator[tuple[tuple[Any, ...], Rows]]:
-        """Give the rows of each combination of values, by the values, in natural order."""
+        """Give the rows of each combination of values, by the values, in order as `values`."""
         keys = list(zip(*(self[name].tolist() for name in names), strict=True))
-        for key in sorted(set(keys), key=_natural):
+        places = [{value: k for k, value in enumerate(self.values(name))} for name in names]
+        ordered = sorted(
+            set(keys), key=lambda key: [place[v] for place, v in zip(places, key, strict=True)]
+        )
+        for key in ordered:
             yield key, self.where(np.array([other == key for other in keys], dtype=bool))
 
     def values(self, name: str) -> list[Any]:
-        """Give the different values of a column in natural order: m2 comes before m10."""
-        return sorted(set(self[name].tolist()), key=lambda value: _natural((value,)))
+        """Give the different values of a column in natural order: m2 comes before m10.
+
+        The ideal arm comes first, and variants in the order in which their sweep names them.
+        """
+        found = sorted(set(self[name].tolist()), key=_natural)
+        if name != "variant" or ORDER not in self:
+            return found
+        place = dict(zip(self[name].tolist(), self[ORDER].tolist(), strict=True))
+        return sorted(found, key=lambda value: place[value])
 
 
 def read_rows(path: Path) -> Rows:
@@ -171,9 +192,9 @@ def _matrix(lists: Sequence[Sequence[float] | None]) -> Array:
     return out
 
 
-def _natural(key: tuple[Any, ...]) -> list[tuple[int, float, str]]:
+def _natural(value: object) -> list[tuple[int, float, str]]:
     """Make a key that sorts the numbers within text by their value, and the ideal arm first."""
-    if key[:1] == (IDEAL,):
-        return [(-1, 0.0, ""), *_natural(key[1:])]
-    parts = [part for value in key for part in re.split(r"(\d+)", str(value))]
+    if value == IDEAL:
+        return [(-1, 0.0, "")]
+    parts = re.split(r"(\d+)", str(value))
     return [(0, float(p), "") if p.isdigit() else (1, 0.0, p) for p in parts]

@@ -108,11 +108,13 @@ def number(value: float, form: str = "#.3g", tone: Tone = "") -> Cell:
 
 
 def interval(given: Interval, form: str = "#.3g", tone: Tone = "", scale: float = 1.0) -> Cell:
-    """Make a cell of a value with its interval, both times a scale."""
+    """Make a cell of a value with its interval where it has one, both times a scale."""
     values = (scale * given.value, scale * given.low, scale * given.high)
     value, low, high = (shown(x, form) for x in values)
     if math.isnan(given.value):
         return Cell(_NONE, values, tone)
+    if math.isnan(given.low):
+        return Cell(value, values, tone)
     # A narrow table breaks the line before the interval, not within.
     return Cell(f"{value} [{low},\u00a0{high}]", values, tone)
 

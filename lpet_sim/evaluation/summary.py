@@ -88,8 +88,10 @@ class InnovationTest:
 
     @property
     def is_consistent(self) -> bool:
-        """Whether the band and the interval of the mean overlap."""
-        return self.mean.low <= self.high and self.low <= self.mean.high
+        """Whether the band and the interval of the mean, or else the mean itself, overlap."""
+        known = np.isfinite(self.mean.low)
+        low, high = (self.mean.low, self.mean.high) if known else (self.mean.value,) * 2
+        return bool(low <= self.high and self.low <= high)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,9 +149,8 @@ MEANS = (
     "dropped_mean",
     "anchors_seen_share",
     "bridged_share",
-    "time_total_s",
-    "time_per_image_ms",
 )
+TIMES = ("time_total_s", "time_per_image_ms")
 
 
 def summarise(rows: Rows, progress: Progress = silent) -> list[Summary]:
@@ -190,7 +191,10 @@ def summarise_variant(arm: str, variant: str, rows: Rows) -> Summary:
         attitude_efficiency=_efficiency(
             rows, np.linalg.norm(attitude_rad, axis=0), "bound_rad", draws
         ),
-        means={name: _mean(rows[name]) for name in MEANS if name in rows},
+        means={
+            **{name: _mean(rows[name]) for name in MEANS if name in rows},
+            **{name: _mean(rows.times(name)) for name in TIMES if name in rows},
+        },
         state_max=_largest(rows.numbers("state_max")),
     )
 

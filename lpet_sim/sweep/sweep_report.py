@@ -229,8 +229,12 @@ _CHARTS: tuple[_Chart, ...] = (
 def _scope(rows: Rows) -> str:
     failed = int(rows.failed.sum())
     counts = {name: len(rows.values(name)) for name in ("data_set", "arm", "variant")}
-    named = [f"{n} {name.replace('_', ' ')}{'s' * (n != 1)}" for name, n in counts.items()]
-    return f"{len(rows)} runs: {', '.join(named)}; {failed} of the runs failed."
+    named = [_counted(n, name.replace("_", " ")) for name, n in counts.items()]
+    return f"{_counted(len(rows), 'run')}: {', '.join(named)}; {failed} failed."
+
+
+def _counted(n: int, what: str) -> str:
+    return f"{n} {what}{'s' * (n != 1)}"
 
 
 def _warnings(summaries: Sequence[Summary]) -> list[str]:

@@ -68,6 +68,9 @@ def test_groups_come_in_natural_order(table: pa.Table) -> None:
     of_m = [label.split("-")[0] for _, label in keys[:24:3]]
     assert of_m == ["m1", "m2", "m5", "m10", "m9999", "m9999", "m9999", "m9999"]
     assert sum(len(group) for _, group in rows.groups("arm", "variant")) == len(rows)
+    labels = rows.values("variant")
+    backwards = np.array([-labels.index(label) for label in rows["variant"]], dtype=float)
+    assert rows.with_columns(variant_order=backwards).values("variant") == labels[::-1]
 
 
 def test_the_papers_pairs_differ_in_one_thing(table: pa.Table) -> None:

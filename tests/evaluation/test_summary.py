@@ -67,7 +67,7 @@ def test_failed_runs_move_the_median_up_and_stay_out_of_what_is_named_completed(
     np.testing.assert_allclose(spread.rms_completed.value, np.sqrt(285 / 9))
     assert spread.high.value == INF
     assert spread.median.low < 6.5 < spread.median.high
-    nothing = error_spread(np.full(5, INF), draw_runs(5, stream(1, "draws")))
+    nothing = error_spread(np.full(7, INF), draw_runs(7, stream(1, "draws")))
     assert nothing.median.value == nothing.median.low == INF
     assert np.isnan(nothing.rms_completed.value)
 
@@ -184,3 +184,22 @@ def test_all_variants_of_all_arms_are_summarised_alike_every_time() -> None:
     assert sum(s.failed for s in first) == int(rows.failed.sum()) > 0
     again = summarise(rows)
     assert [s.errors for s in first] == [s.errors for s in again]
+
+
+def test_a_handful_of_runs_has_no_bootstrap_interval() -> None:
+    """Five runs have their values alone; the sixth brings an interval."""
+    five, six = (error_spread(np.arange(1.0, n + 1), draw_runs(n, stream(1, "d"))) for n in (5, 6))
+    assert five.median.value == 3.0 and np.isnan([five.median.low, five.high.high]).all()
+    assert np.isnan(five.rms_completed.low)
+    assert six.median.low < six.median.value < six.median.high
+
+
+def test_the_first_run_of_a_process_does_not_count_for_the_time() -> None:
+    """Unless there is no other."""
+    cold = np.array([True, False, False])
+    facts = {"time_per_image_ms": np.array([100.0, 2.0, 4.0])}
+    assert summarise_variant("a", "v", runs(3, cold=cold, **facts)).means == {
+        "time_per_image_ms": 3.0
+    }
+    alone = summarise_variant("a", "v", runs(3, cold=np.ones(3, dtype=bool), **facts))
+    np.testing.assert_allclose(alone.means["time_per_image_ms"], 106 / 3)

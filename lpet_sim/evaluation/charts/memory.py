@@ -219,7 +219,7 @@ def _whole(
 
 
 def _completed_times(rows: Rows) -> Array:
-    return rows.numbers("time_per_image_ms")[~rows.failed]
+    return rows.times("time_per_image_ms")[~rows.failed]
 
 
 def _median(values: Array) -> Interval:
