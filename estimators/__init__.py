@@ -8,11 +8,14 @@ from typing import Any
 from estimators.dead_reckoning import DeadReckoning
 from estimators.frame_to_frame import FrameToFrame, FrameToFrameSpec
 from estimators.fused_odometry import FusedOdometry, FusedOdometrySpec
+from estimators.integrated_odometry import IntegratedOdometry, IntegratedOdometrySpec
 from estimators.motion import MotionSpec
 from estimators.peers.batch import GtsamBatch
 from estimators.peers.fixed_lag import GtsamFixedLag
 from estimators.peers.peer_spec import GtsamBatchSpec, GtsamFixedLagSpec
 from estimators.protocol import Estimator
+from estimators.slam import Slam
+from estimators.slam_spec import SlamSpec
 from lpet_sim.errors import UnknownNameError
 from lpet_sim.spec import Spec
 
@@ -21,7 +24,9 @@ Registry = dict[str, tuple[type[Spec], Callable[[Any], Estimator]]]
 ESTIMATORS: Registry = {
     "dead_reckoning": (MotionSpec, DeadReckoning),
     "fused_odometry": (FusedOdometrySpec, FusedOdometry),
+    "odometry": (IntegratedOdometrySpec, IntegratedOdometry),
     "frame_to_frame": (FrameToFrameSpec, FrameToFrame),
+    "slam": (SlamSpec, Slam),
 }
 """Every estimator of our own by name: the type of its spec, and what builds it from one."""
 

@@ -12,7 +12,7 @@ from scipy.linalg import blas, lapack
 
 from estimators.gaussian import symmetrise
 from lpet_sim.errors import BrokenFilterError
-from lpet_sim.recording.arrays import Array
+from lpet_sim.recording.arrays import Array, Ints
 
 
 @njit(cache=True)
@@ -57,37 +57,58 @@ def add_noise(P: Array, B_T: Array) -> None:
 
 
 @njit(cache=True)
-def join_block(P: Array, row: int, J: Array, variance: float) -> None:
-    """Let three free variables become ``J x + noise`` of the first variables x, in place.
+def join_block(P: Array, row: int, known: Ints, J: Array, B: Array) -> None:
+    """Let three free variables become ``J x + B noise`` of others x, in place.
 
     Args:
         P: Covariance, Shape (n, n); changed in the three rows and columns.
         row: First of the three.
-        J: Their derivative by the first k variables, Shape (3, k).
-        variance: Of the noise of each, independent of all else.
+        known: Rows of x, Shape (k,).
+        J: Their derivative by x, Shape (3, k).
+        B: Derivative by unit noises that are independent of all else, Shape (3, m).
     """
-    n, k = len(P), J.shape[1]
+    n, k = len(P), len(known)
     rows = np.zeros((3, n))
     for i in range(3):
         for a in range(k):
             for j in range(n):
-                rows[i, j] += J[i, a] * P[a, j]
+                rows[i, j] += J[i, a] * P[known[a], j]
     for i in range(3):
         for j in range(n):
             P[row + i, j] = rows[i, j]
             P[j, row + i] = rows[i, j]
     for i in range(3):
         for j in range(3):
-            total = variance if i == j else 0.0
+            total = 0.0
+            for a in range(B.shape[1]):
+                total += B[i, a] * B[j, a]
             for a in range(k):
-                total += 0.5 * (rows[i, a] * J[j, a] + rows[j, a] * J[i, a])
+                total += 0.5 * (rows[i, known[a]] * J[j, a] + rows[j, known[a]] * J[i, a])
             P[row + i, row + j] = total
 
 
 @njit(cache=True)
-def free_block(P: Array, row: int) -> None:
-    """Take three variables out of the state, in place: what is left loses nothing."""
-    for i in range(3):
+def clone_block(P: Array, row: int, size: int) -> None:
+    """Let free variables become copies of the first ones, in place.
+
+    Args:
+        P: Covariance, Shape (n, n); changed in the copies' rows and columns.
+        row: First of the copies.
+        size: Their number.
+    """
+    n = len(P)
+    for i in range(size):
+        for j in range(n):
+            P[row + i, j] = P[i, j]
+    for i in range(n):
+        for j in range(size):
+            P[i, row + j] = P[i, j]
+
+
+@njit(cache=True)
+def free_block(P: Array, row: int, size: int) -> None:
+    """Take variables out of the state, in place: what is left loses nothing."""
+    for i in range(size):
         for j in range(len(P)):
             P[row + i, j] = 0.0
             P[j, row + i] = 0.0

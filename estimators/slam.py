@@ -103,7 +103,7 @@ class SlamRun:
 
     def __init__(self, spec: SlamSpec, start: SE3, calibration: StereoCalibration) -> None:
         self._spec = spec
-        self.state = SlamState(start, calibration, spec.formulation)
+        self.state = SlamState(start, calibration, spec)
         self._policy = build_policy(spec.retention)
         self._threshold = chi_square_threshold(3, spec.gate_probability)
         self._standing = spec.anchors is not None

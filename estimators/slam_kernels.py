@@ -1,11 +1,14 @@
 """The arithmetic of the SLAM filter, compiled: sightings of a map, their gate, and new landmarks.
 
-A landmark is three numbers x, the image coordinates (u_left, u_right, v) that it has in a camera
-at its host pose, where it was first seen: near and far ones are then equally close to linear, and
-the error of a new one is that of its sighting. Errors of the pose are in the world, ``R_true =
-exp(phi) R``. In the standard form ``p_true = p + dp`` and ``x_true = x + e``; in the
-right-invariant one ``p_true = exp(phi) p + rho`` and the host poses turn by exp(phi) too, so that
-one rotation moves pose and map together and no sighting can tell of it.
+A landmark is three numbers x in the camera at its host pose: its place [m] or, where it is far or
+where its host is a keyframe in the state, its image coordinates (u_left, u_right, v) [px]. The
+point is ``P / w``: ``P = x, w = 1`` or ``P = b (u_left - cx, v - cy, f), w = u_left - u_right``.
+
+Errors of a pose are in the world, ``R_true = exp(phi) R``. In the standard form ``p_true = p + dp``
+and ``x_true = x + e``. In the right-invariant one ``p_true = exp(phi) p + rho``: if landmarks stand
+in the world, their hosts turn by exp(phi) too, so that one rotation moves pose and map together
+and no sighting can tell of it; if they stand in keyframes, the error of a keyframe is of the same
+kind, and a sighting sees the difference of two such errors, whatever the estimates are.
 """
 
 from __future__ import annotations
@@ -13,10 +16,63 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from estimators.observation import push, transfer_into
+from estimators.observation import push
 from lpet_sim.recording.arrays import Array, Ints
 
-STANDARD, FIRST_ESTIMATES, RIGHT_INVARIANT = 0, 1, 2
+STANDARD, FIRST_ESTIMATES, RIGHT_INVARIANT, RELATIVE = 0, 1, 2, 3
+"""The formulations; `RELATIVE` is the right-invariant one with keyframes as hosts."""
+Four = tuple[float, float, float, float]
+
+
+@njit(cache=True)
+def homogeneous(camera: Array, far: float, x: Array) -> tuple[Four, tuple[Four, Four, Four]]:
+    """Give ``(P, w)`` of a landmark and its derivatives by the three numbers."""
+    if far > 0.0:
+        f, cx, cy, b = camera
+        point = (b * (x[0] - cx), b * (x[2] - cy), b * f, x[0] - x[1])
+        return point, ((b, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, -1.0), (0.0, b, 0.0, 0.0))
+    unit = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
+    return (x[0], x[1], x[2], 1.0), unit
+
+
+@njit(cache=True)
+def _numbers_moved(camera: Array, far: float, P: Four, dP: Four) -> tuple[float, float, float]:
+    """Give how the three numbers change if the point moves by ``dP / w``."""
+    return push(camera, P, dP) if far > 0.0 else (dP[0], dP[1], dP[2])
+
+
+@njit(cache=True)
+def _turned(R: Array, t: Array, P: Four) -> Four:
+    """Give ``(R' P - t w, w)``: a point or its derivative in the frame at ``T = (R, R t)``."""
+    return (
+        R[0, 0] * P[0] + R[1, 0] * P[1] + R[2, 0] * P[2] - t[0] * P[3],
+        R[0, 1] * P[0] + R[1, 1] * P[1] + R[2, 1] * P[2] - t[1] * P[3],
+        R[0, 2] * P[0] + R[1, 2] * P[1] + R[2, 2] * P[2] - t[2] * P[3],
+        P[3],
+    )
+
+
+@njit(cache=True)
+def _seen(
+    camera: Array, R: Array, t: Array, far: float, x: Array, z: Array, G: Array, J: Array
+) -> None:
+    """Predict a sighting with its derivatives by x and by the camera's right perturbation.
+
+    A point in the camera moves by ``-rho w + P x phi``.
+    """
+    point, basis = homogeneous(camera, far, x)
+    P = _turned(R, t, point)
+    focal, X, Y, Z, w = camera[0], P[0], P[1], P[2], P[3]
+    z[0], z[2] = focal * X / Z + camera[1], focal * Y / Z + camera[2]
+    z[1] = z[0] - focal * camera[3] * w / Z
+    for k in range(3):
+        G[0, k], G[1, k], G[2, k] = push(camera, P, _turned(R, t, basis[k]))
+    J[0, 0], J[1, 0], J[2, 0] = push(camera, P, (-w, 0.0, 0.0, 0.0))
+    J[0, 1], J[1, 1], J[2, 1] = push(camera, P, (0.0, -w, 0.0, 0.0))
+    J[0, 2], J[1, 2], J[2, 2] = push(camera, P, (0.0, 0.0, -w, 0.0))
+    J[0, 3], J[1, 3], J[2, 3] = push(camera, P, (0.0, Z, -Y, 0.0))
+    J[0, 4], J[1, 4], J[2, 4] = push(camera, P, (-Z, 0.0, X, 0.0))
+    J[0, 5], J[1, 5], J[2, 5] = push(camera, P, (Y, -X, 0.0, 0.0))
 
 
 @njit(cache=True)
@@ -63,9 +119,8 @@ def linearise(
     camera: Array,
     pose_camera: tuple[Array, Array],
     arm: Array,
-    hosts: tuple[Array, Array],
-    x: Array,
-    x_first: Array,
+    hosts: tuple[Array, Array, Ints],
+    numbers: tuple[Array, Array, Array],
     slots: Ints,
     form: int,
     predicted: Array,
@@ -78,45 +133,63 @@ def linearise(
         camera: Focal length, principal point and baseline, `observation.camera_vector`.
         pose_camera: Rotation and position of the camera in the world.
         arm: From the body's origin to the camera, in the world [m], Shape (3,).
-        hosts: Rotations (c, 3, 3) and positions (c, 3) of the host cameras.
-        x: Landmarks in their hosts [px], Shape (c, 3).
-        x_first: Their first estimates [px], Shape (c, 3).
+        hosts: Rotations (c, 3, 3) and positions (c, 3) of host cameras, and which of them is each
+            landmark's, Shape (c,).
+        numbers: x of the landmarks, their first estimates, both Shape (c, 3), and 1 for those that
+            are far, Shape (c,).
         slots: Which landmarks, Shape (m,).
-        form: `STANDARD`, `FIRST_ESTIMATES` or `RIGHT_INVARIANT`.
+        form: `STANDARD`, `FIRST_ESTIMATES`, `RIGHT_INVARIANT` or `RELATIVE`.
         predicted: Takes the sightings [px], Shape (m, 3).
         H: Takes the derivatives by the pose's error, Shape (m, 3, 6).
         G: Takes the derivatives by the landmark's own, Shape (m, 3, 3).
     """
     R_c, t_c = pose_camera
+    x, x_first, far = numbers
     R, t_back, J, unused = np.empty((3, 3)), np.empty(3), np.empty((3, 6)), np.empty(3)
     for i in range(len(slots)):
         s = slots[i]
-        _relative(hosts[0][s], hosts[1][s], R_c, t_c, R, t_back)
-        transfer_into(camera, R, t_back, x[s], predicted[i], G[i], J)
+        h = hosts[2][s]
+        _relative(hosts[0][h], hosts[1][h], R_c, t_c, R, t_back)
+        _seen(camera, R, t_back, far[s], x[s], predicted[i], G[i], J)
         if form == FIRST_ESTIMATES:
-            transfer_into(camera, R, t_back, x_first[s], unused, G[i], J)
+            _seen(camera, R, t_back, far[s], x_first[s], unused, G[i], J)
         _world_jacobian(J, R_c, arm, form != RIGHT_INVARIANT, H[i])
 
 
 @njit(cache=True)
-def gate(P: Array, slots: Ints, r: Array, H: Array, G: Array, variance: Array, out: Array) -> None:
-    """Give the squared Mahalanobis distance of each innovation by itself, in place, Shape (m,)."""
-    D, PD, S = np.empty((3, 9)), np.empty((9, 3)), np.empty((3, 3))
-    index = np.arange(9)
-    for i in range(len(slots)):
-        D[:, :6], D[:, 6:] = H[i], G[i]
+def gate(
+    P: Array, rows: tuple[Ints, Ints], r: Array, H: Array, G: Array, variance: Array, out: Array
+) -> None:
+    """Give the squared Mahalanobis distance of each innovation by itself, in place, Shape (m,).
+
+    Args:
+        P: Covariance of the state, Shape (n, n).
+        rows: First row of each landmark and of its host, -1 where that is no part of the state.
+        r: Innovations, Shape (m, 3).
+        H: Derivatives by the pose's error; by the host's it is -H, Shape (m, 3, 6).
+        G: Derivatives by the landmark's, Shape (m, 3, 3).
+        variance: Of each image coordinate, Shape (m,).
+        out: Takes the distances.
+    """
+    D, PD, S = np.zeros((3, 15)), np.zeros((15, 3)), np.empty((3, 3))
+    index = np.arange(15)
+    for i in range(len(r)):
+        k = 9 if rows[1][i] < 0 else 15
+        D[:, :6], D[:, 6:9], D[:, 9:] = H[i], G[i], -H[i]
         for a in range(3):
-            index[6 + a] = 6 + 3 * slots[i] + a
-        for a in range(9):
+            index[6 + a] = rows[0][i] + a
+        for a in range(6):
+            index[9 + a] = rows[1][i] + a
+        for a in range(k):
             for b in range(3):
                 PD[a, b] = 0.0
-                for k in range(9):
-                    PD[a, b] += P[index[a], index[k]] * D[b, k]
+                for c in range(k):
+                    PD[a, b] += P[index[a], index[c]] * D[b, c]
         for a in range(3):
             for b in range(3):
                 S[a, b] = variance[i] if a == b else 0.0
-                for k in range(9):
-                    S[a, b] += D[a, k] * PD[k, b]
+                for c in range(k):
+                    S[a, b] += D[a, c] * PD[c, b]
         out[i] = _weighted_square(S, r[i])
 
 
@@ -143,15 +216,17 @@ def _weighted_square(S: Array, r: Array) -> float:
 
 
 @njit(cache=True)
-def project_covariance(P: Array, slots: Ints, H: Array, G: Array, out: Array) -> None:
-    """Give ``P H'`` of the stacked sightings in place, Shape (n, 3 m): only ten columns count."""
-    n, m = len(P), len(slots)
-    for r in range(n):
-        p = P[r]
-        for i in range(m):
-            c = 6 + 3 * slots[i]
+def project_covariance(P: Array, rows: tuple[Ints, Ints], H: Array, G: Array, out: Array) -> None:
+    """Give ``P H'`` of the stacked sightings in place, Shape (n, 3 m): few columns count."""
+    p = np.empty(6)
+    for r in range(len(P)):
+        row = P[r]
+        for i in range(len(H)):
+            c, h = rows[0][i], rows[1][i]
+            for k in range(6):
+                p[k] = row[k] if h < 0 else row[k] - row[h + k]
             for a in range(3):
-                total = p[c] * G[i, a, 0] + p[c + 1] * G[i, a, 1] + p[c + 2] * G[i, a, 2]
+                total = row[c] * G[i, a, 0] + row[c + 1] * G[i, a, 1] + row[c + 2] * G[i, a, 2]
                 for k in range(6):
                     total += p[k] * H[i, a, k]
                 out[r, 3 * i + a] = total
@@ -159,25 +234,31 @@ def project_covariance(P: Array, slots: Ints, H: Array, G: Array, out: Array) ->
 
 @njit(cache=True)
 def innovation_covariance(
-    PH_T: Array, slots: Ints, H: Array, G: Array, variance: Array, out: Array
+    PH_T: Array, rows: tuple[Ints, Ints], H: Array, G: Array, variance: Array, out: Array
 ) -> None:
     """Give ``H P H' + noise`` of the stacked sightings in place, Shape (3 m, 3 m)."""
-    m = len(slots)
+    m = len(H)
     for i in range(m):
-        c = 6 + 3 * slots[i]
+        c, h = rows[0][i], rows[1][i]
+        out[3 * i : 3 * i + 3] = 0.0
         for a in range(3):
-            row = 3 * i + a
-            for j in range(3 * m):
-                total = 0.0
-                for k in range(6):
-                    total += H[i, a, k] * PH_T[k, j]
-                for k in range(3):
-                    total += G[i, a, k] * PH_T[c + k, j]
-                out[row, j] = total
+            row = out[3 * i + a]
+            for k in range(3):
+                _add_scaled(row, PH_T[c + k], G[i, a, k])
+            for k in range(6):
+                _add_scaled(row, PH_T[k], H[i, a, k])
+                if h >= 0:
+                    _add_scaled(row, PH_T[h + k], -H[i, a, k])
     for row in range(3 * m):
         for j in range(row):
             out[row, j] = out[j, row] = 0.5 * (out[row, j] + out[j, row])
         out[row, row] += variance[row // 3]
+
+
+@njit(cache=True)
+def _add_scaled(target: Array, source: Array, factor: float) -> None:
+    for j in range(len(target)):
+        target[j] += factor * source[j]
 
 
 @njit(cache=True)
@@ -237,7 +318,7 @@ def consensus(S: Array, r: Array, threshold: float, support: Array) -> int:
 
 @njit(cache=True)
 def entry_jacobian(
-    camera: Array, x: Array, R_c: Array, arm: Array, turns: bool, out: Array
+    camera: Array, far: float, x: Array, R_c: Array, arm: Array, turns: bool, out: Array
 ) -> None:
     """Give how a landmark's error in its host depends on the pose's error when it enters, (3, 6).
 
@@ -245,8 +326,8 @@ def entry_jacobian(
     ``rho + phi x point``.
     """
     J = np.empty((3, 6))
-    w, f, b = x[0] - x[1], camera[0], camera[3]
-    P = (b * (x[0] - camera[1]), b * (x[2] - camera[2]), b * f, w)
+    P = homogeneous(camera, far, x)[0]
+    w = P[3]
     moves = (
         (w, 0.0, 0.0, 0.0),
         (0.0, w, 0.0, 0.0),
@@ -256,13 +337,62 @@ def entry_jacobian(
         (-P[1], P[0], 0.0, 0.0),
     )
     for k in range(6):
-        J[0, k], J[1, k], J[2, k] = push(camera, P, moves[k])
+        J[0, k], J[1, k], J[2, k] = _numbers_moved(camera, far, P, moves[k])
     _world_jacobian(J, R_c, arm, turns, out)
 
 
 @njit(cache=True)
+def relative_entry(
+    camera: Array,
+    now: tuple[Array, Array],
+    host: tuple[Array, Array],
+    z: Array,
+    x: Array,
+    H: Array,
+    G: Array,
+) -> None:
+    """Carry a sighting into the camera of a keyframe, with derivatives, in place.
+
+    Args:
+        camera: `observation.camera_vector`.
+        now: Rotation and position of the camera that sees it.
+        host: Those of the keyframe's camera.
+        z: The sighting [px], Shape (3,).
+        x: Takes its image coordinates in the keyframe [px], Shape (3,).
+        H: Takes their derivative by the keyframe's error; by the pose's it is -H, Shape (3, 6).
+        G: Takes their derivative by z, Shape (3, 3).
+    """
+    R, t_back, J = np.empty((3, 3)), np.empty(3), np.empty((3, 6))
+    _relative(now[0], now[1], host[0], host[1], R, t_back)
+    _seen(camera, R, t_back, 1.0, z, x, G, J)
+    _world_jacobian(J, host[0], host[1], True, H)
+
+
+@njit(cache=True)
+def numbers_of(camera: Array, far: float, z: Array, x: Array, by_z: Array) -> None:
+    """Give the three numbers of a landmark seen at z and their derivatives by z, in place."""
+    focal, cx, cy, b = camera
+    by_z[:] = np.eye(3)
+    x[:] = z
+    if far > 0.0:
+        return
+    scale = b / (z[0] - z[1])
+    x[0], x[1], x[2] = scale * (z[0] - cx), scale * (z[2] - cy), scale * focal
+    by_z[:] = 0.0
+    by_z[0, 0], by_z[1, 2] = scale, scale
+    for i in range(3):
+        by_z[i, 0] -= x[i] * scale / b
+        by_z[i, 1] += x[i] * scale / b
+
+
+@njit(cache=True)
 def turning_noise(
-    camera: Array, hosts: tuple[Array, Array], x: Array, alive: Array, turn: Array, B_T: Array
+    camera: Array,
+    hosts: tuple[Array, Array],
+    numbers: tuple[Array, Array, Array],
+    alive: Array,
+    turn: Array,
+    B_T: Array,
 ) -> None:
     """Add to B' how turns of the rover against the map enter right-invariant landmarks, in place.
 
@@ -272,18 +402,17 @@ def turning_noise(
     Args:
         camera: `observation.camera_vector`.
         hosts: Rotations (c, 3, 3) and positions (c, 3) of the host cameras.
-        x: Landmarks [px], Shape (c, 3).
+        numbers: As in `linearise`.
         alive: 1 where there is a landmark, Shape (c,).
         turn: Turns in the world, one for each noise [rad], Shape (m, 3).
         B_T: Changed, Shape (m, 6 + 3 c).
     """
-    focal, cx, cy, b = camera
     back, shift = np.empty(3), np.empty(3)
-    for s in range(len(x)):
+    for s in range(len(alive)):
         if alive[s] == 0.0:
             continue
-        R, t, w = hosts[0][s], hosts[1][s], x[s, 0] - x[s, 1]
-        P = (b * (x[s, 0] - cx), b * (x[s, 2] - cy), b * focal, w)
+        R, t, far = hosts[0][s], hosts[1][s], numbers[2][s]
+        P = homogeneous(camera, far, numbers[0][s])[0]
         for m in range(len(turn)):
             o = turn[m]
             lever = (
@@ -293,10 +422,11 @@ def turning_noise(
             )
             for i in range(3):
                 back[i] = -(R[0, i] * o[0] + R[1, i] * o[1] + R[2, i] * o[2])
-                shift[i] = -w * (R[0, i] * lever[0] + R[1, i] * lever[1] + R[2, i] * lever[2])
+                along = R[0, i] * lever[0] + R[1, i] * lever[1] + R[2, i] * lever[2]
+                shift[i] = -P[3] * along
             dX = shift[0] + back[1] * P[2] - back[2] * P[1]
             dY = shift[1] + back[2] * P[0] - back[0] * P[2]
             dZ = shift[2] + back[0] * P[1] - back[1] * P[0]
-            d = push(camera, P, (dX, dY, dZ, 0.0))
+            d = _numbers_moved(camera, far, P, (dX, dY, dZ, 0.0))
             for i in range(3):
                 B_T[m, 6 + 3 * s + i] += d[i]

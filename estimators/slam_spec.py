@@ -101,9 +101,17 @@ class SlamSpec(Spec):
         formulation: ``standard`` linearises at the latest estimate, ``first_estimates`` at the
             first one of each pose and landmark, ``right_invariant`` takes errors in the world, with
             one rotation for pose and map.
+        landmark_frame: ``world``: landmarks stand in the world, as in the paper; ``keyframe``: they
+            are held by their image coordinates in past camera poses, which are part of the state.
+            The latter goes with ``right_invariant`` alone, and is taken for it if None.
+        keyframe_m: A new keyframe is made for landmarks that enter further than this from the last
+            one [m].
+        keyframe_rad: Or turned by more [rad].
         association_check: Beside the gate of each sighting: ``none``, or ``one_point_ransac``.
         gate_probability: Share of fitting sightings that pass their chi-square gate.
         sightings_min: An image with fewer accepted sightings counts as bridged by odometry.
+        far_disparity_sigmas: A landmark whose disparity is below this many of its standard
+            deviations when it enters is far: it is held as image coordinates, not as a place.
         misfits_max: A landmark leaves after this many sightings in a row that do not fit.
         slip_share: If fewer than this share of the known landmarks pass their gates, the wheels may
             have slipped: the step is then believed to within its own length only.
@@ -120,9 +128,13 @@ class SlamSpec(Spec):
     coupling: Literal["coupled", "decoupled", "decoupled_pose_kept"] = "coupled"
     anchors: AnchorSpec | None = None
     formulation: Literal["standard", "first_estimates", "right_invariant"] = "right_invariant"
+    landmark_frame: Literal["world", "keyframe"] = "keyframe"
+    keyframe_m: Annotated[float, Field(gt=0.0)] = 0.5
+    keyframe_rad: Annotated[float, Field(gt=0.0)] = 0.2
     association_check: Literal["none", "one_point_ransac"] = "one_point_ransac"
     gate_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.999
     sightings_min: Annotated[int, Field(ge=0)] = 3
+    far_disparity_sigmas: Annotated[float, Field(ge=0.0)] = 5.0
     misfits_max: Annotated[int, Field(ge=1)] = 3
     slip_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
     slip_sigma_m: Annotated[float, Field(gt=0.0)] = 0.01
@@ -131,12 +143,26 @@ class SlamSpec(Spec):
     free_sigma_rad: Annotated[float, Field(gt=0.0)] = 0.03
     noise_scale: Annotated[float, Field(gt=0.0)] = 1.0
 
+    @model_validator(mode="before")
+    @classmethod
+    def _usual_frame(cls, values: object) -> object:
+        """Take the landmark frame that goes with the formulation where none is given."""
+        if not isinstance(values, dict) or values.get("landmark_frame") is not None:
+            return values
+        invariant = values.get("formulation", "right_invariant") == "right_invariant"
+        return values | {"landmark_frame": "keyframe" if invariant else "world"}
+
     @model_validator(mode="after")
-    def _decoupled_in_the_world(self) -> Self:
+    def _fits_together(self) -> Self:
         if self.coupling != "coupled" and self.formulation == "right_invariant":
             raise ValueError(
                 "a decoupled filter drops correlations of errors in world coordinates: its "
                 "formulation must be standard or first_estimates"
+            )
+        if self.landmark_frame == "keyframe" and self.formulation != "right_invariant":
+            raise ValueError(
+                f"landmarks of a {self.formulation} filter stand in the world: landmark_frame "
+                "must be world, or formulation right_invariant"
             )
         return self
 
@@ -145,4 +171,5 @@ class SlamSpec(Spec):
         """How run names tell the variant, such as ``m10-n9999-coupled-observable-invariant``."""
         observable = "unobservable" if self.anchors is None else "observable"
         form = {"standard": "standard", "first_estimates": "fej"}.get(self.formulation, "invariant")
+        form += "_world" if form == "invariant" and self.landmark_frame == "world" else ""
         return f"{self.retention.label}-{self.coupling}-{observable}-{form}"

@@ -10,19 +10,22 @@ from numpy.typing import NDArray
 from estimators import gaussian, gaussian_blocks, slam_kernels
 from estimators.jacobians import hat, se3_exp
 from estimators.observation import camera_vector, transfer
-from estimators.slam_kernels import FIRST_ESTIMATES, RIGHT_INVARIANT, STANDARD
-from estimators.slam_map import POSE, LandmarkMap
+from estimators.slam_kernels import FIRST_ESTIMATES, RELATIVE, RIGHT_INVARIANT, STANDARD
+from estimators.slam_map import FREE, POSE, LandmarkMap
+from estimators.slam_spec import SlamSpec
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.recording.calibration import StereoCalibration
 
 FORMS = {
-    "standard": STANDARD,
-    "first_estimates": FIRST_ESTIMATES,
-    "right_invariant": RIGHT_INVARIANT,
+    ("standard", "world"): STANDARD,
+    ("first_estimates", "world"): FIRST_ESTIMATES,
+    ("right_invariant", "world"): RIGHT_INVARIANT,
+    ("right_invariant", "keyframe"): RELATIVE,
 }
 _START_VARIANCE = 1e-12
 _GROWTH = 1.25
+_POSE_ROWS = np.arange(POSE)
 
 
 @dataclass
@@ -31,13 +34,15 @@ class Innovations:
 
     Attributes:
         slots: Which landmarks, Shape (m,).
+        rows: First row in the state of each landmark and of its keyframe, -1 if it has none.
         r: Seen minus predicted [px], Shape (m, 3).
-        H: Derivatives by the pose's error, Shape (m, 3, 6).
+        H: Derivatives by the pose's error; by the keyframe's it is -H, Shape (m, 3, 6).
         G: Derivatives by the landmark's own, Shape (m, 3, 3).
         variance: Of each image coordinate [px^2], Shape (m,).
     """
 
     slots: Ints
+    rows: tuple[Ints, Ints]
     r: Array
     H: Array
     G: Array
@@ -50,9 +55,9 @@ class Innovations:
         """Keep some of them."""
         if which.all():
             return self
-        return Innovations(
-            self.slots[which], self.r[which], self.H[which], self.G[which], self.variance[which]
-        )
+        rows = self.rows[0][which], self.rows[1][which]
+        values = (a[which] for a in (self.r, self.H, self.G, self.variance))
+        return Innovations(self.slots[which], rows, *values)
 
 
 class SlamState:
@@ -65,19 +70,23 @@ class SlamState:
         landmarks: The map.
     """
 
-    def __init__(self, T_world_body: SE3, calibration: StereoCalibration, formulation: str) -> None:
-        self._calibration = calibration
+    def __init__(self, T_world_body: SE3, calibration: StereoCalibration, spec: SlamSpec) -> None:
+        self._calibration, self._spec = calibration, spec
         self._camera = camera_vector(calibration)
         T_body_camera = calibration.T_body_camera.se3()
         self._R_body_camera = np.array(T_body_camera.rotation)
         self._p_body_camera = np.array(T_body_camera.translation)
         self._origin = np.array(T_world_body.translation)
-        self._form = FORMS[formulation]
+        self._form = FORMS[spec.formulation, spec.landmark_frame]
         self.R, self.p = np.array(T_world_body.rotation), np.zeros(3)
         self._predicted = self.R, self.p
         self.landmarks = LandmarkMap()
         start = gaussian.independent(np.full(POSE, _START_VARIANCE))
         self.P = gaussian_blocks.enlarged(start, self.landmarks.rows)
+
+    @property
+    def _invariant(self) -> bool:
+        return self._form in (RIGHT_INVARIANT, RELATIVE)
 
     @property
     def pose(self) -> SE3:
@@ -91,7 +100,7 @@ class SlamState:
         """
         M = np.zeros((POSE, POSE))
         M[:3, :3] = M[3:, 3:] = self.R.T
-        if self._form == RIGHT_INVARIANT:
+        if self._invariant:
             M[:3, 3:] = -self.R.T @ hat(self.p)
         return gaussian.transport(self.P[:POSE, :POSE], M)
 
@@ -106,7 +115,7 @@ class SlamState:
         before = self._predicted[1] if self._form == FIRST_ESTIMATES else self.p
         self.p = self.p + self.R @ p_step
         self.R = self.R @ R_step
-        if self._form != RIGHT_INVARIANT:
+        if not self._invariant:
             F = np.eye(POSE)
             F[:3, 3:] = -hat(self.p - before)
             gaussian_blocks.move_block(self.P, F, np.zeros((POSE, POSE)))
@@ -122,10 +131,11 @@ class SlamState:
         B_T = np.zeros((len(noise), self.landmarks.rows))
         turn = np.ascontiguousarray(noise[:, 3:] @ self.R.T)
         B_T[:, :3], B_T[:, 3:POSE] = noise[:, :3] @ self.R.T, turn
-        if self._form == RIGHT_INVARIANT:
+        if self._invariant:
             B_T[:, :3] += np.cross(self.p, turn)
+        if self._form == RIGHT_INVARIANT:
             m = self.landmarks
-            slam_kernels.turning_noise(self._camera, m.hosts, m.x, m.alive, turn, B_T)
+            slam_kernels.turning_noise(self._camera, m.hosts[:2], m.numbers, m.alive, turn, B_T)
         gaussian_blocks.add_noise(self.P, B_T)
 
     def innovations(self, slots: Ints, stereo_px: Array, variance: Array) -> Innovations:
@@ -133,24 +143,29 @@ class SlamState:
         n, m = len(slots), self.landmarks
         predicted, H, G = np.empty((n, 3)), np.empty((n, 3, POSE)), np.empty((n, 3, 3))
         pose = self._camera_pose(self.R, self.p)
-        arm = self.R @ self._p_body_camera
+        arm = pose[1] if self._form == RELATIVE else self.R @ self._p_body_camera
         slam_kernels.linearise(
-            self._camera, pose, arm, m.hosts, m.x, m.x_first, slots, self._form, predicted, H, G
+            self._camera, pose, arm, m.hosts, m.numbers, slots, self._form, predicted, H, G
         )
-        return Innovations(slots, stereo_px - predicted, H, G, variance)
+        return Innovations(slots, self._rows(slots), stereo_px - predicted, H, G, variance)
+
+    def _rows(self, slots: Ints) -> tuple[Ints, Ints]:
+        hosts = self.landmarks.host[slots]
+        inside = self._form == RELATIVE
+        return POSE + 3 * slots, POSE + 3 * hosts if inside else np.full(len(slots), -1)
 
     def squared_distances(self, seen: Innovations) -> Array:
         """Give the squared Mahalanobis distance of each sighting by itself, Shape (m,)."""
         out = np.empty(len(seen))
-        slam_kernels.gate(self.P, seen.slots, seen.r, seen.H, seen.G, seen.variance, out)
+        slam_kernels.gate(self.P, seen.rows, seen.r, seen.H, seen.G, seen.variance, out)
         return out
 
     def joint(self, seen: Innovations) -> tuple[Array, Array]:
         """Give ``P H'``, Shape (n, 3 m), and the innovations' covariance, Shape (3 m, 3 m)."""
         PH_T = np.empty((len(self.P), 3 * len(seen)))
         S = np.empty((3 * len(seen), 3 * len(seen)))
-        slam_kernels.project_covariance(self.P, seen.slots, seen.H, seen.G, PH_T)
-        slam_kernels.innovation_covariance(PH_T, seen.slots, seen.H, seen.G, seen.variance, S)
+        slam_kernels.project_covariance(self.P, seen.rows, seen.H, seen.G, PH_T)
+        slam_kernels.innovation_covariance(PH_T, seen.rows, seen.H, seen.G, seen.variance, S)
         return PH_T, S
 
     def correct(self, seen: Innovations, PH_T: Array, S: Array) -> float:
@@ -158,39 +173,98 @@ class SlamState:
         dx, nis = gaussian_blocks.update_in_place(self.P, PH_T, S, seen.r.ravel())
         turn, shift = se3_exp(np.ascontiguousarray(dx[:POSE]))
         m = self.landmarks
-        m.x += dx[POSE:].reshape(-1, 3)
+        m.x += dx[POSE:].reshape(-1, 3) * m.alive[:, None]
         self.R = turn @ self.R
+        if not self._invariant:
+            self.p = self.p + dx[:3]
+            return nis
+        self.p = turn @ self.p + shift
         if self._form == RIGHT_INVARIANT:
-            self.p = turn @ self.p + shift
             m.R_world_host = turn @ m.R_world_host
             m.p_world_host = m.p_world_host @ turn.T
         else:
-            self.p = self.p + dx[:3]
+            self._move_keyframes(dx)
         return nis
+
+    def _move_keyframes(self, dx: Array) -> None:
+        m = self.landmarks
+        for slot in m.keyframes:
+            first = POSE + 3 * slot
+            turn, shift = se3_exp(np.ascontiguousarray(dx[first : first + POSE]))
+            m.R_world_host[slot] = turn @ m.R_world_host[slot]
+            m.p_world_host[slot] = turn @ m.p_world_host[slot] + shift
 
     def enter(self, landmark_id: Ints, stereo_px: Array, variance: Array) -> None:
         """Let landmarks that are seen now into the map."""
+        if len(landmark_id) and self._form == RELATIVE:
+            self._enter_keyframe(landmark_id, stereo_px, variance)
+        elif len(landmark_id):
+            self._enter_world(landmark_id, stereo_px, variance)
+
+    def _room(self, count: int) -> Ints:
+        """Give free slots, and make them if there are too few."""
         m = self.landmarks
-        free = m.free_slots(len(landmark_id))
-        if len(free) < len(landmark_id):
-            m.grow(max(int(_GROWTH * m.capacity), m.capacity + len(landmark_id)))
+        if len(m.free_slots(count)) < count:
+            m.grow(max(int(_GROWTH * m.capacity), m.capacity + count))
             self.P = gaussian_blocks.enlarged(self.P, m.rows)
-            free = m.free_slots(len(landmark_id))
+        return m.free_slots(count)
+
+    def _enter_world(self, landmark_id: Ints, stereo_px: Array, variance: Array) -> None:
+        m, free = self.landmarks, self._room(len(landmark_id))
         held = self._predicted if self._form == FIRST_ESTIMATES else (self.R, self.p)
         host, arm = self._camera_pose(*held), held[0] @ self._p_body_camera
         placed = stereo_px if held[1] is self.p else self._seen_from(host, stereo_px)
-        J = np.empty((3, POSE))
-        turns = self._form != RIGHT_INVARIANT
+        disparity = stereo_px[:, 0] - stereo_px[:, 1]
+        far = disparity < self._spec.far_disparity_sigmas * np.sqrt(2.0 * variance)
+        J, by_z, turns = np.empty((3, POSE)), np.empty((3, 3)), not self._invariant
         for i, slot in enumerate(free):
-            m.enter(slot, int(landmark_id[i]), stereo_px[i], host)
-            m.x[slot] = placed[i]
-            slam_kernels.entry_jacobian(self._camera, stereo_px[i], host[0], arm, turns, J)
-            gaussian_blocks.join_block(self.P, POSE + 3 * int(slot), J, float(variance[i]))
+            m.enter(int(slot), int(landmark_id[i]), far[i], host)
+            slam_kernels.numbers_of(self._camera, m.far[slot], placed[i], m.x[slot], by_z)
+            slam_kernels.numbers_of(self._camera, m.far[slot], stereo_px[i], m.x_first[slot], by_z)
+            slam_kernels.entry_jacobian(
+                self._camera, m.far[slot], m.x_first[slot], host[0], arm, turns, J
+            )
+            by_z *= np.sqrt(variance[i])
+            gaussian_blocks.join_block(self.P, POSE + 3 * int(slot), _POSE_ROWS, J, by_z)
+
+    def _enter_keyframe(self, landmark_id: Ints, stereo_px: Array, variance: Array) -> None:
+        m, now = self.landmarks, self._camera_pose(self.R, self.p)
+        keyframe = self._keyframe(now)
+        host = m.R_world_host[keyframe].copy(), m.p_world_host[keyframe].copy()
+        known = np.concatenate([_POSE_ROWS, POSE + 3 * keyframe + _POSE_ROWS])
+        x, H, G = np.empty(3), np.empty((3, POSE)), np.empty((3, 3))
+        for i, slot in enumerate(self._room(len(landmark_id))):
+            slam_kernels.relative_entry(self._camera, now, host, stereo_px[i], x, H, G)
+            m.enter(int(slot), int(landmark_id[i]), True, keyframe)
+            m.x[slot] = m.x_first[slot] = x
+            noise, J = np.sqrt(variance[i]) * G, np.hstack([-H, H])
+            gaussian_blocks.join_block(self.P, POSE + 3 * int(slot), known, J, noise)
+
+    def _keyframe(self, now: tuple[Array, Array]) -> int:
+        """Give the latest keyframe, or make one of the camera's pose if that is too far away."""
+        m = self.landmarks
+        if m.keyframes and self._near(m.keyframes[-1], now):
+            return m.keyframes[-1]
+        if m.free_pair() < 0:
+            self._room(m.capacity - int((m.id != FREE).sum()) + 2)
+        slot = m.free_pair()
+        m.add_keyframe(slot, now)
+        gaussian_blocks.clone_block(self.P, POSE + 3 * slot, POSE)
+        for idle in m.idle_keyframes():
+            gaussian_blocks.free_block(self.P, POSE + 3 * idle, POSE)
+            m.drop_keyframe(idle)
+        return slot
+
+    def _near(self, slot: int, now: tuple[Array, Array]) -> bool:
+        m = self.landmarks
+        away = np.linalg.norm(m.p_world_host[slot] - now[1])
+        cosine = 0.5 * (np.trace(m.R_world_host[slot].T @ now[0]) - 1.0)
+        return bool(away < self._spec.keyframe_m and cosine > np.cos(self._spec.keyframe_rad))
 
     def leave(self, slots: Ints) -> None:
         """Take landmarks out of the state."""
         for slot in slots:
-            gaussian_blocks.free_block(self.P, POSE + 3 * int(slot))
+            gaussian_blocks.free_block(self.P, POSE + 3 * int(slot), 3)
             self.landmarks.leave(int(slot))
 
     def decouple(self, keep_pose: bool) -> None:
