@@ -63,8 +63,13 @@ def test_growth_shows_the_middle_half_of_the_runs(rows: Rows) -> None:
     assert names == [f"{manner} (full SLAM)" for manner in (
         "decoupled, unobservable", "coupled, unobservable", "coupled, observable")]  # fmt: skip
     curves = np.vstack([np.full(4, v) for v in (1.0, 2.0, 3.0, 4.0, np.nan)])
-    low, middle, high = curve_quartiles(Rows({"error_curve": curves}))
+    failure = np.array(["", "", "", "", "timeout"], dtype=object)
+    low, middle, high = curve_quartiles(Rows({"error_curve": curves, "failure": failure}))
     assert (low[0], middle[0], high[0]) == (2.0, 3.0, 4.0)
+    short = np.array([[1.0, 2.0, np.nan], [1.0, 2.0, np.nan]])
+    ended = Rows({"error_curve": short, "failure": np.array(["", "lost"], dtype=object)})
+    np.testing.assert_array_equal(curve_quartiles(ended.where([0]))[1], [1.0, 2.0, 2.0])
+    np.testing.assert_array_equal(curve_quartiles(ended.where([1]))[1], [1.0, 2.0, np.inf])
     chosen = charts.plot_error_growth(rows, variants=rows.values("variant")[:2])
     assert list(_curves(chosen, 0)) == rows.values("variant")[:2]
 

@@ -115,6 +115,10 @@ def test_efficiency_is_rms_over_rms_and_below_the_bound_it_is_marked() -> None:
     good = at_bound.position_efficiency
     assert good is not None and good.ratio.low < 1 < good.ratio.high and not good.is_suspicious
     np.testing.assert_allclose(good.ratio.value, rms(error) / rms(bound))
+    scaled = summarise_variant("a", "v", runs(end_error_m=1.15 * bound, bound_m=bound))
+    assert scaled.position_efficiency is not None
+    ends = scaled.position_efficiency.ratio.low, scaled.position_efficiency.ratio.high
+    np.testing.assert_allclose(ends, 1.15)  # Error and bound are resampled together.
     leaking = summarise_variant("a", "v", runs(end_error_m=0.6 * error, bound_m=bound))
     assert leaking.position_efficiency is not None
     assert leaking.position_efficiency.is_suspicious

@@ -27,7 +27,8 @@ def plot_error_growth(rows: Rows, variants: Sequence[str] | None = None) -> Figu
 
     Args:
         rows: Rows of one arm.
-        variants: Labels of the variants; if None, of each manner the one that remembers most.
+        variants: Labels of the variants; if None, of each manner the one that remembers most, and
+            all variants where none has a memory.
 
     Raises:
         RowsError: The rows hold no error curves.
@@ -54,8 +55,16 @@ def plot_error_growth(rows: Rows, variants: Sequence[str] | None = None) -> Figu
 
 
 def curve_quartiles(rows: Rows) -> tuple[Array, Array, Array]:
-    """Give lower quartile, median and upper quartile of the error curves, Shape (k,) each."""
-    curves = np.where(np.isnan(rows[CURVE]), np.inf, rows[CURVE]).T
+    """Give lower quartile, median and upper quartile of the error curves, Shape (k,) each.
+
+    Where a failed run's curve ends its error is infinite. A run that did not fail may still end a
+    little before the traverse does: its last error stands for the rest.
+    """
+    curve = rows[CURVE]
+    reached = np.maximum.accumulate(np.where(np.isnan(curve), 0, np.arange(curve.shape[1])), axis=1)
+    held = np.take_along_axis(curve, reached, axis=1)
+    held = np.where(rows.failed[:, None], curve, held)
+    curves = np.where(np.isnan(held), np.inf, held).T
     low, middle, high = (quantile(curves, share) for share in (0.25, 0.5, 0.75))
     return low, middle, high
 
@@ -66,7 +75,7 @@ def _named(rows: Rows, labels: Sequence[str] | None) -> list[tuple[str, str]]:
     known = variants_of(rows)
     chosen = [(name, _most(of)) for name, of in manners(known).items()]
     named = [(f"{name} ({_word(variant)})", variant.label) for name, variant in chosen]
-    return named + [(v.label, v.label) for v in known if not v.retention]
+    return named or [(v.label, v.label) for v in known]
 
 
 def _most(variants: Sequence[Variant]) -> Variant:
