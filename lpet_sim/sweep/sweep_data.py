@@ -36,8 +36,8 @@ class DataSet:
         digest: Names its content.
         path_m: Distance truly driven [m].
         ended: Kind of the event that ended the drive, empty where that is not known.
-        note: One sentence where something is not as planned, such as a drive that failed.
-        is_used: Whether runs are made on it.
+        note: One sentence where the drive did not go as planned.
+        left_out: Why no runs are made on it; empty where they are.
         stamp: Size and time of the file that was looked over.
     """
 
@@ -48,7 +48,7 @@ class DataSet:
     path_m: float = 0.0
     ended: str = ""
     note: str = ""
-    is_used: bool = True
+    left_out: str = ""
     stamp: tuple[int, int] = (0, 0)
 
 
@@ -164,7 +164,7 @@ def _prepare(item: _ToPrepare) -> DataSet | str:
         try:
             simulate(item.traverse, data_set.seed, path)
         except LpetError as error:
-            return replace(data_set, note=f"could not be driven: {error}", is_used=False)
+            return replace(data_set, left_out=f"it could not be driven: {error}")
     try:
         return _looked_over(data_set, read_recording(path), item.traverse)
     except RecordingError as error:
@@ -200,10 +200,8 @@ def _check_origin(path: Path, manifest: Manifest, traverse: TraverseSpec, seed: 
 
 
 def _long_enough(data_set: DataSet, min_path_m: float) -> DataSet:
-    if not data_set.is_used and not data_set.digest:
+    if not data_set.digest:
         return data_set
-    if data_set.path_m >= min_path_m:
-        return replace(data_set, is_used=True)
+    is_short = data_set.path_m < min_path_m
     text = f"its path of {data_set.path_m:.2f} m is shorter than {min_path_m:g} m"
-    parts = (data_set.note.split("; left out: ")[0], f"left out: {text}")
-    return replace(data_set, note="; ".join(filter(None, parts)), is_used=False)
+    return replace(data_set, left_out=text if is_short else "")

@@ -86,7 +86,7 @@ def run_sweep(
     found = find_data_sets(spec.data_sets, folder.resolve())[:limit]
     with _alone_in(output_folder(folder.resolve())) as home:
         data_sets = prepare_data_sets(spec.data_sets, found, home, pool, driving)
-        planned = list(plan_rows(spec, variants, [d for d in data_sets if d.is_used]))
+        planned = list(plan_rows(spec, variants, [d for d in data_sets if not d.left_out]))
         redo = Redo(spec.time_limit_s, now() if retry_failed else "")
         settings = _settings(spec, redo, home, pool.is_local)
         store = RowStore(home / JOURNALS).refresh()

@@ -51,11 +51,11 @@ def _cells(group: Sequence[Row]) -> tuple[str, ...]:
 
 def noted_table(data_sets: Sequence[DataSet]) -> Table | None:
     """List the data sets of which something is to be said; None if there are none."""
-    noted = [data_set for data_set in data_sets if data_set.note]
+    noted = [data_set for data_set in data_sets if data_set.note or data_set.left_out]
     if not noted:
         return None
-    table = Table("data set", "path [m]", "used", "what is to be said", title="Data sets")
+    table = Table("data set", "path [m]", "what is to be said", "left out", title="Data sets")
     for data_set in noted:
-        used = "yes" if data_set.is_used else "no"
-        table.add_row(data_set.name, f"{data_set.path_m:.1f}", used, data_set.note)
+        path_m = f"{data_set.path_m:.1f}"
+        table.add_row(data_set.name, path_m, data_set.note, data_set.left_out or "no")
     return table

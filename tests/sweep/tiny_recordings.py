@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from lpet_sim.recording.streams import Measurements, SightingStream, concatenate
 from lpet_sim.recording.truth import BodyTruth, Event, Truth
 from lpet_sim.recording.writer import write_recording
 from lpet_sim.rng import stream
+from lpet_sim.sweep.sweep_store import TIMING, Row
 from tests.estimators.stereo_traverse import stereo
 from tests.estimators.traverses import calibration, readings, rolling_wheels, ticks
 
@@ -76,3 +79,14 @@ def write_sweep(path: Path, mapping: dict[str, Any]) -> Path:
     """Write a sweep as YAML."""
     path.write_text(yaml.safe_dump(mapping, sort_keys=False))
     return path
+
+
+def without_timing(rows: Iterable[Row]) -> list[str]:
+    """Give rows as text to the bit, NaN equal to NaN, without the columns that may differ."""
+    return [json.dumps({k: v for k, v in row.items() if k not in TIMING}) for row in rows]
+
+
+def events(folder: Path) -> list[dict[str, Any]]:
+    """Give every whole event of a sweep's journals."""
+    texts = [path.read_text() for path in sorted((folder / "journal").glob("*.jsonl"))]
+    return [json.loads(line) for text in texts for line in text.split("\n")[:-1]]
