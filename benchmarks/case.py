@@ -25,21 +25,23 @@ class Case:
         length_m: How far the rover drives.
         pairs: Image pairs that the camera and vision benchmarks use.
         repetitions: How often the short things are done.
+        sensed_m: How far the landmark sensor goes.
     """
 
     length_m: float
     pairs: int
     repetitions: int
+    sensed_m: float
 
     @classmethod
     def full(cls) -> Case:
         """Make the case whose numbers count."""
-        return cls(length_m=2.5, pairs=60, repetitions=5)
+        return cls(length_m=2.5, pairs=60, repetitions=5, sensed_m=34.0)
 
     @classmethod
     def quick(cls) -> Case:
         """Make a case that only shows that everything runs."""
-        return cls(length_m=0.6, pairs=12, repetitions=2)
+        return cls(length_m=0.6, pairs=12, repetitions=2, sensed_m=1.0)
 
     def traverse(self) -> TraverseSpec:
         """Give the traverse: 100 m/h, a pair of 640 x 480 px every 2 cm, all sensors."""
