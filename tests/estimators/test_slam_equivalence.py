@@ -9,7 +9,7 @@ import pytest
 
 from estimators.slam import Slam
 from estimators.slam_spec import AnchorSpec, BoundedQueue, KeepAll, SlamSpec, TimeToLive
-from lpet_sim.evaluation.consistency import Consistency, anees
+from lpet_sim.evaluation.consistency import Consistency, anees, chi_square_band
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import NS_PER_S, Array
 from lpet_sim.recording.estimate import Estimate
@@ -241,15 +241,22 @@ def test_the_names_of_landmarks_do_not_matter(variant: dict[str, object]) -> Non
 RUNS, STEPS = 40, 9
 
 
-def end_consistency(noise_scale: float) -> Consistency:
-    """Give the ANEES of the last pose over short runs, told the noise times a factor."""
-    nees = []
+def consistency(noise_scale: float) -> tuple[Consistency, bool]:
+    """Give the ANEES of the last pose over short runs, told the noise times a factor.
+
+    Also whether all their innovations, which are white in a filter that knows its noise, are as
+    large as they say.
+    """
+    nees, nis, dof = [], 0.0, 0
     for seed in range(RUNS):
         found = run(few_landmarks(seed), noise_scale=noise_scale, retention=KeepAll().to_mapping())
         assert found.covariance is not None
         xi = error(found)[-1]
         nees.append(float(xi @ np.linalg.solve(found.covariance[-1], xi)))
-    return anees(nees, 6)
+        nis += float(found.diagnostics["nis"].sum())
+        dof += int(found.diagnostics["nis_dof"].sum())
+    low, high = chi_square_band(1, dof)
+    return anees(nees, 6), low <= nis <= high
 
 
 def few_landmarks(seed: int) -> Measurements:
@@ -261,5 +268,24 @@ def few_landmarks(seed: int) -> Measurements:
 
 @pytest.mark.parametrize(("told", "consistent"), [(1.0, True), (0.5, False), (2.0, False)])
 def test_the_filter_is_consistent_for_the_noise_there_is(told: float, consistent: bool) -> None:
-    """NEES of 40 short runs; told half or twice the noise it leaves the band."""
-    assert end_consistency(told).is_consistent == consistent
+    """NEES and NIS of 40 short runs; told half or twice the noise both leave their bands."""
+    nees, innovations_fit = consistency(told)
+    assert nees.is_consistent == consistent
+    assert innovations_fit == consistent
+
+
+def test_after_blind_images_the_standard_form_believes_in_an_attitude_it_cannot_know() -> None:
+    """Five blind images leave 1 deg of attitude open; the right-invariant form keeps it open."""
+    nees = {"standard": [], "right_invariant": []}  # type: dict[str, list[float]]
+    for formulation, seed in ((f, s) for f in nees for s in range(10)):
+        given = recorded(seed, IMAGES)
+        assert given.sightings is not None
+        image = image_of(given.sightings)
+        blind = replace(given, sightings=kept(given.sightings, (image < 3) | (image > 7)))
+        retention = TimeToLive(images=3).to_mapping()
+        found = run(blind, retention=retention, formulation=formulation)
+        assert found.covariance is not None
+        phi = error(found)[-1, 3:]
+        nees[formulation].append(float(phi @ np.linalg.solve(found.covariance[-1, 3:, 3:], phi)))
+    assert anees(nees["right_invariant"], 3).is_consistent
+    assert np.mean(nees["standard"]) > 10 * np.mean(nees["right_invariant"])
