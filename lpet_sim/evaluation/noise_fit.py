@@ -2,6 +2,8 @@
 
 Each landmark's point is fitted to its track; what is left is split by restricted maximum likelihood
 into white noise of u_left, u_right and v and a fixed error of each landmark (`variance_kernels`).
+What front ends really make has heavy tails: the noise is Student's t with degrees of freedom that
+are fitted as well, by expectation-maximisation, whose weights enter the restricted likelihood.
 Errors that all sightings share (disparity bias, focal length, baseline, the camera's mounting) are
 found beside them by generalised least squares, for the true motion tells them from the landmarks'
 places. A point takes up most of a landmark's fixed error, so that this is known only as well as its
@@ -14,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.special import gammaln
 from scipy.stats import chi2
 
 from lpet_sim.errors import RecordingError
@@ -28,10 +31,16 @@ SHARED: Final = ("disparity_bias_px", "focal_scale_error", "baseline_scale_error
 """Shared errors that a sensor's spec can hold; the camera's mounting follows as a rotation."""
 _SHARED_PRIOR: Final = np.array([5.0, 0.2, 0.2, 0.2, 0.2, 0.2])
 _START_PX: Final = 1.0
-_ROUNDS: Final = 8
-_SETTLING_ROUNDS: Final = 8
+_ROUNDS: Final = 15
+_STILL: Final = 1e-3
+_SETTLING_ROUNDS: Final = 15
+_STILL: Final = 1e-3
 _VARIANCE_MIN_PX2: Final = 1e-10
 _TRACKS_MIN: Final = 10
+_LONG: Final = 4
+_TAILS: Final = np.geomspace(1.0, 200.0, 80)
+TAILS_MAX: Final = float(_TAILS[-1])
+"""Degrees of freedom from which on Student's t is called Gaussian."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +48,10 @@ class NoiseFit:
     """What is left of sightings at the best points of their landmarks.
 
     Attributes:
-        variance_px2: Of the white noise of u_left, u_right, v, and of the fixed error of each
-            coordinate of a landmark, Shape (4,).
+        variance_px2: Squared scales of the white noise of u_left, u_right, v under Student's t, and
+            the variance of the fixed error of each coordinate of a landmark, Shape (4,).
         variance_se_px2: Standard errors of these, Shape (4,).
+        tails: Degrees of freedom of Student's t; `TAILS_MAX` is Gaussian.
         shared: Disparity bias [px], declared over true focal length less 1, the same of the
             baseline, rotation of the camera against its declared mounting [rad], Shape (6,).
         shared_se: Standard errors of these, tracks taken as independent, Shape (6,).
@@ -49,29 +59,61 @@ class NoiseFit:
             Shape (k, 3).
         residual_px: Measured less predicted coordinates [px], Shape (m, 3).
         H: Derivatives of the coordinates by the landmark's point, Shape (m, 3, 3).
+        fixed_px: Likeliest fixed error of each landmark [px], Shape (k, 3).
+        left_px: What point and fixed error leave of the residuals [px], Shape (m, 3).
+        taken: Share of the variance of each that both took up, Shape (m, 3).
         fits: Which sightings can be of their track's landmark by chi-square, Shape (m,).
         path: The camera's path at which this holds.
     """
 
     variance_px2: Array
     variance_se_px2: Array
+    tails: float
     shared: Array
     shared_se: Array
     point_px: Array
     residual_px: Array
     H: Array
+    fixed_px: Array
+    left_px: Array
+    taken: Array
     fits: Flags
     path: CameraPath
 
     @property
     def sigma_px(self) -> Array:
-        """Standard deviations of u_left, u_right, v and of the fixed error [px], Shape (4,)."""
-        return np.sqrt(self.variance_px2)
+        """Noise of u_left, u_right, v and the fixed error, 1 sigma [px], Shape (4,).
+
+        The white noise is the Gaussian one that limits an estimator as much: Student's t of scale s
+        in p = 3 dimensions holds the information ``(n + p) / (n + p + 2) / s^2`` on its centre.
+
+        Reference:
+            Lange, Little, Taylor, Robust statistical modeling using the t distribution (1989),
+            appendix B.
+        """
+        factor = (self.tails + 5.0) / (self.tails + 3.0)
+        return np.sqrt(self.variance_px2 * np.array([factor, factor, factor, 1.0]))
 
     @property
     def sigma_se_px(self) -> Array:
         """Standard errors of `sigma_px` by the delta rule, Shape (4,)."""
         return np.asarray(self.variance_se_px2 / (2.0 * np.maximum(self.sigma_px, 1e-3)))
+
+    @property
+    def weight(self) -> Array:
+        """Weight of each sighting under Student's t, 0 where it does not fit, Shape (m,)."""
+        # What point and fixed error took up is not seen in what they leave, but it is there.
+        far = (self.left_px**2 / self.variance_px2[:3] + np.minimum(self.taken, 1.0)).sum(axis=1)
+        return np.asarray(self.fits * (self.tails + 3.0) / (self.tails + far))
+
+    def studentised_px(self, tracks: Tracks) -> tuple[Array, Flags]:
+        """Give residuals as large as the noise that made them [px], (m, 3), and which can be used.
+
+        Used are sightings of landmarks that are seen often enough for their residuals to tell.
+        """
+        use = self.fits & (tracks.total(self.fits) >= _LONG)[tracks.track]
+        share = np.maximum(1.0 - self.taken, 0.1)
+        return np.asarray(self.left_px / np.sqrt(share)), np.asarray(use)
 
 
 def fit_noise(
@@ -89,7 +131,8 @@ def fit_noise(
         calibration: The declared pair.
         settle: Take out of the residuals what all landmarks of an image have in common, for truth
             that is itself measured. Shared errors are found at the given poses all the same.
-        gate_probability: Share of Gaussian sightings that would be called impossible.
+        gate_probability: Share of Gaussian sightings that would be called impossible, by the
+            declared noise or the measured one, whichever is larger.
 
     Raises:
         RecordingError: Too few landmarks are seen more than once.
@@ -101,12 +144,20 @@ def fit_noise(
         )
     gate = float(chi2.isf(gate_probability, 3))
     fit = _blank(tracks, path)
-    for _ in range(_ROUNDS):
-        fit = _refined(_pointed(fit, tracks, calibration, gate), tracks, calibration, shared=True)
+    for k in range(_ROUNDS):
+        before = fit.sigma_px
+        fit = _pointed(fit, tracks, calibration, gate, cold=k == 0)
+        fit = _refined(fit, tracks, calibration, shared=True)
+        if np.allclose(fit.sigma_px, before, rtol=_STILL, atol=_STILL):
+            break
     if settle:
+        # A pose could trade places with a fixed error that all its landmarks share: none meanwhile.
+        fit = replace(fit, fixed_px=np.zeros_like(fit.fixed_px))
         for _ in range(_SETTLING_ROUNDS):
             fit = _settled(_pointed(fit, tracks, calibration, gate), tracks, calibration)
-            fit = _refined(_pointed(fit, tracks, calibration, gate), tracks, calibration, False)
+        for _ in range(_ROUNDS // 2):
+            fit = _pointed(fit, tracks, calibration, gate)
+            fit = _refined(fit, tracks, calibration, shared=False)
         fit = _charged(fit, tracks)
     return fit
 
@@ -115,9 +166,10 @@ def _blank(tracks: Tracks, path: CameraPath) -> NoiseFit:
     """Start from a pixel of white noise and no other error."""
     m = len(tracks.image)
     start = np.array([*[_START_PX**2] * 3, _VARIANCE_MIN_PX2])
-    nothing, points = np.zeros(6), np.zeros((len(tracks), 3))
-    residual, H, fits = np.zeros((m, 3)), np.zeros((m, 3, 3)), np.zeros(m, dtype=bool)
-    return NoiseFit(start, start, nothing, nothing, points, residual, H, fits, path)
+    nothing, points, rows = np.zeros(6), np.zeros((len(tracks), 3)), np.zeros((m, 3))
+    H, fits = np.zeros((m, 3, 3)), np.zeros(m, dtype=bool)
+    shared = TAILS_MAX, nothing, nothing
+    return NoiseFit(start, start, *shared, points, rows, H, points, rows, rows, fits, path)
 
 
 def corrected(
@@ -131,20 +183,35 @@ def corrected(
     return camera, CameraPath.from_se3(turn @ path.T_camera_world)
 
 
-def _pointed(fit: NoiseFit, tracks: Tracks, stereo: StereoCalibration, gate: float) -> NoiseFit:
+def _pointed(
+    fit: NoiseFit, tracks: Tracks, stereo: StereoCalibration, gate: float, cold: bool = False
+) -> NoiseFit:
     """Fit every landmark's point at the errors known so far."""
     camera, path = corrected(fit.shared, stereo, fit.path)
-    px = tracks.stereo_px + np.array([0.0, fit.shared[0], 0.0])
-    points, residual = np.empty_like(fit.point_px), np.empty_like(fit.residual_px)
+    fixed = fit.fixed_px[tracks.track]
+    shift = np.array([0.0, fit.shared[0], 0.0])
+    px = tracks.stereo_px + shift - fixed
+    points, residual = fit.point_px.copy(), np.empty_like(fit.residual_px)
     H, fits = np.empty_like(fit.H), np.empty_like(fit.fits)
-    poses = path.R_camera_world, path.t_camera_world_m
-    variance = fit.variance_px2[:3] + fit.variance_px2[3]
-    image = tracks.image
     fit_points(
-        tracks.starts, image, px, *poses, camera, variance, gate, points, residual, H, fits
+        tracks.starts,
+        tracks.image,
+        px,
+        path.R_camera_world,
+        path.t_camera_world_m,
+        camera,
+        fit.variance_px2[:3],
+        fit.tails,
+        gate * np.maximum(1.0, tracks.sigma_px**2 / fit.variance_px2[:3].mean()),
+        cold,
+        points,
+        residual,
+        H,
+        fits,
     )
     fits &= _held(tracks, fits)
-    return replace(fit, point_px=points, residual_px=residual, H=H, fits=fits)
+    both = residual + fixed
+    return replace(fit, point_px=points, residual_px=both, H=H, left_px=residual, fits=fits)
 
 
 def _held(tracks: Tracks, fits: Flags) -> Flags:
@@ -158,16 +225,42 @@ def _refined(fit: NoiseFit, tracks: Tracks, stereo: StereoCalibration, shared: b
     X = shared_design(fit, tracks, stereo)
     F, quadratic = np.zeros((4, 4)), np.zeros(4)
     sums = np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6))
-    used = fit.residual_px, fit.H, X, fit.fits
-    sum_tracks(tracks.starts, *used, fit.variance_px2, F, quadratic, sums)
+    fixed, left = np.zeros_like(fit.point_px), np.zeros_like(fit.left_px)
+    weight, taken = fit.weight, np.zeros_like(left)
+    used = fit.residual_px, fit.H, X, weight, fit.variance_px2
+    sum_tracks(tracks.starts, *used, F, quadratic, sums, (fixed, left, taken))
     variance = solve_variances(F, quadratic)
     spread = np.sqrt(2.0 * np.diag(np.linalg.pinv(F)))
-    fit = replace(fit, variance_px2=variance, variance_se_px2=spread)
+    fit = replace(
+        fit,
+        variance_px2=variance,
+        variance_se_px2=spread,
+        fixed_px=fixed,
+        left_px=left,
+        taken=taken,
+    )
+    fit = replace(fit, tails=fit_tails(fit, tracks))
     if not shared:
         return fit
     bread = np.linalg.inv(sums[0] + np.diag(_SHARED_PRIOR**-2.0))
     step_se = np.sqrt(np.diag(bread @ sums[2] @ bread))
     return replace(fit, shared=fit.shared + bread @ sums[1], shared_se=step_se)
+
+
+def fit_tails(fit: NoiseFit, tracks: Tracks) -> float:
+    """Find the most likely degrees of freedom of Student's t at the scales known so far."""
+    px, use = fit.studentised_px(tracks)
+    if not np.any(use):
+        return TAILS_MAX
+    far = (px[use] ** 2 / fit.variance_px2[:3]).sum(axis=1)
+    likelihood = [
+        np.mean(-(n + 3.0) / 2.0 * np.log1p(far / n))
+        + gammaln((n + 3.0) / 2.0)
+        - gammaln(n / 2.0)
+        - 1.5 * np.log(n)
+        for n in _TAILS
+    ]
+    return float(_TAILS[int(np.argmax(likelihood))])
 
 
 def solve_variances(F: Array, quadratic: Array) -> Array:
@@ -214,7 +307,7 @@ def _settled(fit: NoiseFit, tracks: Tracks, stereo: StereoCalibration) -> NoiseF
     J = true.projection_jacobian(p)
     J = np.concatenate([J, -J @ so3.hat(p)], axis=2)
     use = fit.fits & (tracks.lengths > 1)[tracks.track]
-    weighted = J[use] / fit.variance_px2[:3, None]
+    weighted = J[use] * fit.weight[use, None, None] / fit.variance_px2[:3, None]
     normal, right = np.zeros((tracks.images, 6, 6)), np.zeros((tracks.images, 6))
     np.add.at(normal, tracks.image[use], np.einsum("mki,mkj->mij", weighted, J[use]))
     np.add.at(right, tracks.image[use], np.einsum("mki,mk->mi", weighted, fit.residual_px[use]))

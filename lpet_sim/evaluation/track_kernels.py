@@ -18,8 +18,9 @@ CAUCHY = 9.0
 """Squared normalised residual at which a sighting's weight has fallen to a half."""
 _DISPARITY_MIN_PX = 0.05
 _CANDIDATES = 8
-_ROBUST_ITERATIONS = 12
-_PLAIN_ITERATIONS = 4
+_ITERATIONS = 6
+_STILL_PX = 1e-4
+_NEAREST_M = 0.05
 
 
 @njit(cache=True, nogil=True)
@@ -45,23 +46,23 @@ def predict(q: Array, R: Array, t: Array, camera: Array, px: Array, H: Array) ->
         H: Receives the derivative.
     """
     f, b = camera[0], camera[1]
-    p_ref = np.empty(3)
-    point_in_camera(q, camera, p_ref)
-    p = R @ p_ref + t
-    z = max(p[2], 1e-3)
-    px[0], px[1] = f * p[0] / z + camera[2], f * (p[0] - b) / z + camera[2]
-    px[2] = f * p[1] / z + camera[3]
-    scale = p_ref[2] / f
+    z_ref = f * b / q[2]
+    x_ref, y_ref = (q[0] - camera[2]) * z_ref / f, (q[1] - camera[3]) * z_ref / f
+    x = R[0, 0] * x_ref + R[0, 1] * y_ref + R[0, 2] * z_ref
+    y = R[1, 0] * x_ref + R[1, 1] * y_ref + R[1, 2] * z_ref
+    z = R[2, 0] * x_ref + R[2, 1] * y_ref + R[2, 2] * z_ref
+    right = z_ref / f, z_ref / f, -1.0 / q[2]
+    H[0, 0], H[1, 0], H[2, 0] = R[0, 0] * right[0], R[1, 0] * right[0], R[2, 0] * right[0]
+    H[0, 1], H[1, 1], H[2, 1] = R[0, 1] * right[1], R[1, 1] * right[1], R[2, 1] * right[1]
+    H[0, 2], H[1, 2], H[2, 2] = x * right[2], y * right[2], z * right[2]
+    x, y, z = x + t[0], y + t[1], max(z + t[2], 1e-3)
+    px[0], px[1] = f * x / z + camera[2], f * (x - b) / z + camera[2]
+    px[2] = f * y / z + camera[3]
     for j in range(3):
-        if j == 0:
-            dp = R[:, 0] * scale
-        elif j == 1:
-            dp = R[:, 1] * scale
-        else:
-            dp = -(R @ p_ref) / q[2]
-        H[0, j] = f / z * (dp[0] - p[0] / z * dp[2])
-        H[1, j] = f / z * (dp[0] - (p[0] - b) / z * dp[2])
-        H[2, j] = f / z * (dp[1] - p[1] / z * dp[2])
+        dx, dy, dz = H[0, j], H[1, j], H[2, j]
+        H[0, j] = f / z * (dx - x / z * dz)
+        H[1, j] = f / z * (dx - (x - b) / z * dz)
+        H[2, j] = f / z * (dy - y / z * dz)
 
 
 @njit(cache=True, nogil=True)
@@ -76,12 +77,17 @@ def _residuals(
     """Fill residuals, Shape (n, 3), and derivatives, Shape (n, 3, 3), of a track."""
     for i in range(len(px)):
         predict(q, R[i], t[i], camera, residual[i], H[i])
-        residual[i] = px[i] - residual[i]
+        for k in range(3):
+            residual[i, k] = px[i, k] - residual[i, k]
 
 
 @njit(cache=True, nogil=True)
 def _distance(residual: Array, variance: Array) -> float:
-    return float(np.sum(residual**2 / variance))
+    return float(
+        residual[0] ** 2 / variance[0]
+        + residual[1] ** 2 / variance[1]
+        + residual[2] ** 2 / variance[2]
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -116,37 +122,56 @@ def _relative(
 
 
 @njit(cache=True, nogil=True)
-def _robust_start(
-    q: Array, px: Array, poses: tuple[Array, Array], camera: Array, variance: Array
+def _start(
+    q: Array, px: Array, R: Array, t: Array, camera: Array, variance: Array, r: Array, H: Array
 ) -> None:
-    """Start from the sighting that agrees best with all others, then down-weight the far ones."""
+    """Start from the sighting that agrees best with all others."""
     n = len(px)
-    residual, H, weight = np.empty((n, 3)), np.empty((n, 3, 3)), np.ones(n)
-    R, t = poses
-    best, start = np.inf, q.copy()
-    stride = max(1, n // _CANDIDATES)
-    for c in range(0, n, stride):
-        at = np.empty(3)
-        point_in_camera(_in_reference(px[c]), camera, at)
-        p = R[c].T @ (at - t[c])
-        if p[2] <= 0.05:
+    best, start, p = np.inf, q.copy(), np.empty(3)
+    for c in range(0, n, max(1, n // _CANDIDATES)):
+        point_in_camera(_in_reference(px[c]), camera, p)
+        p = R[c].T @ (p - t[c])
+        if p[2] <= _NEAREST_M:
             continue
         trial = np.array([0.0, 0.0, camera[0] * camera[1] / p[2]])
         trial[0] = camera[0] * p[0] / p[2] + camera[2]
         trial[1] = camera[0] * p[1] / p[2] + camera[3]
-        _residuals(trial, px, R, t, camera, residual, H)
+        _residuals(trial, px, R, t, camera, r, H)
         cost = 0.0
         for i in range(n):
-            cost += np.log1p(_distance(residual[i], variance) / CAUCHY)
+            cost += np.log1p(_distance(r[i], variance) / CAUCHY)
         if cost < best:
             best, start = cost, trial
     q[:] = start
-    for _ in range(_ROBUST_ITERATIONS):
-        _residuals(q, px, R, t, camera, residual, H)
-        for i in range(n):
-            weight[i] = 1.0 / (1.0 + _distance(residual[i], variance) / CAUCHY)
-        if _step(q, residual, H, weight, variance) < 1e-4:
-            break
+
+
+@njit(cache=True, nogil=True)
+def _fit(
+    q: Array,
+    px: Array,
+    R: Array,
+    t: Array,
+    camera: Array,
+    variance: Array,
+    tails: float,
+    gate: Array,
+    r: Array,
+    H: Array,
+) -> None:
+    """Fit a point: far sightings count less and less, in the end not at all beyond the gate."""
+    weight = np.ones(len(px))
+    for robust in (True, False):
+        for _ in range(_ITERATIONS):
+            _residuals(q, px, R, t, camera, r, H)
+            for i in range(len(px)):
+                far = _distance(r[i], variance)
+                if robust:
+                    weight[i] = 1.0 / (1.0 + far / CAUCHY)
+                else:
+                    weight[i] = (tails + 3.0) / (tails + far) if far < gate[i] else 0.0
+            if weight.sum() == 0.0 or _step(q, r, H, weight, variance) < _STILL_PX:
+                break
+    _residuals(q, px, R, t, camera, r, H)
 
 
 @njit(cache=True, nogil=True)
@@ -158,7 +183,9 @@ def fit_points(
     t_camera_world_m: Array,
     camera: Array,
     variance: Array,
-    gate: float,
+    tails: float,
+    gate: Array,
+    cold: bool,
     q: Array,
     residual: Array,
     H: Array,
@@ -175,8 +202,10 @@ def fit_points(
         R_camera_world: True rotations, Shape (n, 3, 3).
         t_camera_world_m: Origin of the world in each camera [m], Shape (n, 3).
         camera: (focal_px, baseline_m, cx_px, cy_px).
-        variance: Variance of each coordinate about the track's own point [px^2], Shape (3,).
-        gate: Squared normalised residual from which on a sighting does not fit.
+        variance: Squared scale of the white noise of each coordinate [px^2], Shape (3,).
+        tails: Degrees of freedom of Student's t, which weighs the sightings.
+        gate: Squared normalised residual from which on a sighting does not fit, Shape (m,).
+        cold: Whether to look for starts; else the points given are the starts.
         q: Receives the points, Shape (k, 3).
         residual: Receives measured less predicted coordinates [px], Shape (m, 3).
         H: Receives the derivatives by q, Shape (m, 3, 3).
@@ -186,18 +215,12 @@ def fit_points(
         first, last = starts[j], starts[j + 1]
         n = last - first
         rows, ref = np.arange(first, last), first + n // 2
-        R, t, weight = np.empty((n, 3, 3)), np.empty((n, 3)), np.ones(n)
+        R, t = np.empty((n, 3, 3)), np.empty((n, 3))
         _relative(rows, ref, image, R_camera_world, t_camera_world_m, R, t)
-        q[j] = _in_reference(px[ref])
         track_px, r, h = px[first:last], residual[first:last], H[first:last]
-        if n > 1:
-            _robust_start(q[j], track_px, (R, t), camera, variance)
-        for _ in range(_PLAIN_ITERATIONS):
-            _residuals(q[j], track_px, R, t, camera, r, h)
-            for i in range(n):
-                weight[i] = 1.0 if _distance(r[i], variance) < gate else 0.0
-            if weight.sum() < 1 or _step(q[j], r, h, weight, variance) < 1e-6:
-                break
-        _residuals(q[j], track_px, R, t, camera, r, h)
+        if cold:
+            q[j] = _in_reference(px[ref])
+            _start(q[j], track_px, R, t, camera, variance, r, h)
+        _fit(q[j], track_px, R, t, camera, variance, tails, gate[first:last], r, h)
         for i in range(n):
-            fits[first + i] = _distance(r[i], variance) < gate
+            fits[first + i] = _distance(r[i], variance) < gate[first + i]

@@ -6,7 +6,8 @@ each coordinate, ``b ~ N(0, theta_3 I)``, and e white noise of variances theta_0
 of the three coordinates. With ``V = D + theta_3 B B'`` and ``P = V^-1 - V^-1 H (H' V^-1 H)^-1 H'
 V^-1`` the score and the information of the restricted likelihood are ``y' P Q_k P y - tr(P Q_k)``
 and ``tr(P Q_k P Q_l)``, for the four parts Q of V. Because D is diagonal and M = [B H] is thin, P
-is ``D^-1 - D^-1 M C M' D^-1`` with a C of 6x6, so that a track costs what it has rows.
+is ``D^-1 - D^-1 M C M' D^-1`` with a C of 6x6, so that a track costs what it has rows. Weights of
+the rows, as from Student's t, multiply y, X, H and B by their roots.
 
 Reference:
     Patterson and Thompson, Recovery of inter-block information when block sizes are unequal (1971).
@@ -21,27 +22,27 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 
 @njit(cache=True, nogil=True)
-def _design(H: Array, k: int, m: Array) -> None:
-    """Fill the row of [B H] for coordinate k."""
+def _design(H: Array, k: int, root: float, m: Array) -> None:
+    """Fill the weighted row of [B H] for coordinate k."""
     m[:3] = 0.0
-    m[k] = 1.0
-    m[3:] = H[k]
+    m[k] = root
+    for a in range(3):
+        m[3 + a] = H[k, a] * root
 
 
 @njit(cache=True, nogil=True)
-def _grams(H: Array, fits: Flags, grams: Array) -> int:
+def _grams(H: Array, root: Array, grams: Array) -> int:
     """Fill the Gram matrix of each coordinate's rows, Shape (3, 6, 6), and give their number."""
     grams[:] = 0.0
     m, n = np.empty(6), 0
     for i in range(len(H)):
-        if fits[i]:
+        if root[i] > 0:
             n += 1
             for k in range(3):
-                _design(H[i], k, m)
+                _design(H[i], k, root[i], m)
                 grams[k] += np.outer(m, m)
     return n
 
@@ -66,17 +67,28 @@ def _information(grams: Array, n: int, C: Array, theta: Array, F: Array) -> None
 
 @njit(cache=True, nogil=True)
 def _weighted(
-    residual: Array, H: Array, X: Array, fits: Flags, theta: Array, my: Array, mx: Array
+    residual: Array, H: Array, X: Array, root: Array, theta: Array, my: Array, mx: Array
 ) -> None:
     """Fill ``M' D^-1 y``, Shape (6,), and ``M' D^-1 X``, Shape (6, g)."""
     my[:], mx[:] = 0.0, 0.0
     m = np.empty(6)
     for i in range(len(residual)):
-        if fits[i]:
+        if root[i] > 0:
             for k in range(3):
-                _design(H[i], k, m)
-                my += m * (residual[i, k] / theta[k])
-                mx += np.outer(m, X[i, k]) / theta[k]
+                _design(H[i], k, root[i], m)
+                my += m * (root[i] * residual[i, k] / theta[k])
+                mx += np.outer(m, X[i, k]) * (root[i] / theta[k])
+
+
+@njit(cache=True, nogil=True)
+def _quadratic(left: Array, root: Array, theta: Array, quadratic: Array) -> None:
+    """Add a track's quadratic forms ``y' P Q_k P y``, Shape (4,)."""
+    for k in range(3):
+        total = 0.0
+        for i in range(len(left)):
+            quadratic[k] += (root[i] * left[i, k] / theta[k]) ** 2
+            total += root[i] ** 2 * left[i, k] / theta[k]
+        quadratic[3] += total**2
 
 
 @njit(cache=True, nogil=True)
@@ -85,11 +97,12 @@ def sum_tracks(
     residual: Array,
     H: Array,
     X: Array,
-    fits: Flags,
+    weight: Array,
     theta: Array,
     F: Array,
     quadratic: Array,
     shared: tuple[Array, Array, Array],
+    tracks: tuple[Array, Array, Array],
 ) -> None:
     """Add up what all tracks with two sightings or more say of variances and shared errors.
 
@@ -98,12 +111,14 @@ def sum_tracks(
         residual: Measured less predicted coordinates [px], Shape (m, 3).
         H: Derivatives by the point, Shape (m, 3, 3).
         X: Derivatives by the shared errors, Shape (m, 3, g).
-        fits: Rows to use, Shape (m,).
+        weight: Weights of the rows, which divide their variances; 0 leaves one out, Shape (m,).
         theta: Variances of u_left, u_right, v and of the fixed error [px^2], Shape (4,), positive.
         F: Receives the information of the variances, Shape (4, 4).
         quadratic: Receives ``y' P Q_k P y``, Shape (4,).
         shared: Receive ``X' P X`` (g, g), ``X' P y`` (g,) and the sum of the outer products of the
             tracks' shares of the latter (g, g).
+        tracks: Receive the likeliest fixed error of each landmark (k, 3), the residuals that it and
+            the point leave (m, 3) [px], and the share of their variance that both took up (m, 3).
     """
     g = X.shape[2]
     grams, my, mx, m = np.empty((3, 6, 6)), np.empty(6), np.empty((6, g)), np.empty(6)
@@ -112,25 +127,25 @@ def sum_tracks(
         prior[k, k] = 1.0 / theta[3]
     for j in range(len(starts) - 1):
         rows = slice(starts[j], starts[j + 1])
-        r, h, x, use = residual[rows], H[rows], X[rows], fits[rows]
-        n = _grams(h, use, grams)
+        r, h, x, root = residual[rows], H[rows], X[rows], np.sqrt(weight[rows])
+        n = _grams(h, root, grams)
         if n < 2:
             continue
         total = grams[0] / theta[0] + grams[1] / theta[1] + grams[2] / theta[2]
         C = np.linalg.inv(total + prior)
         _information(grams, n, C, theta, F)
-        _weighted(r, h, x, use, theta, my, mx)
-        a, score, sums = C @ my, np.zeros(g), np.zeros(3)
+        _weighted(r, h, x, root, theta, my, mx)
+        a, score = C @ my, np.zeros(g)
         shared[0][:] -= mx.T @ C @ mx
+        tracks[0][j], tracks[1][rows], tracks[2][rows] = a[:3], 0.0, 0.0
         for i in range(len(r)):
-            if use[i]:
-                for k in range(3):
-                    _design(h[i], k, m)
-                    weighted = (r[i, k] - m @ a) / theta[k]
-                    quadratic[k] += weighted**2
-                    sums[k] += weighted
-                    score += x[i, k] * weighted
-                    shared[0][:] += np.outer(x[i, k], x[i, k]) / theta[k]
-        quadratic[3] += np.sum(sums**2)
+            for k in range(3):
+                _design(h[i], k, 1.0, m)
+                left = r[i, k] - m @ a
+                tracks[1][starts[j] + i, k] = left
+                tracks[2][starts[j] + i, k] = root[i] ** 2 * (m @ C @ m) / theta[k]
+                score += x[i, k] * (root[i] ** 2 * left / theta[k])
+                shared[0][:] += np.outer(x[i, k], x[i, k]) * (root[i] ** 2 / theta[k])
+        _quadratic(tracks[1][rows], root, theta, quadratic)
         shared[1][:] += score
         shared[2][:] += np.outer(score, score)
