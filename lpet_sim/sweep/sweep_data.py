@@ -123,11 +123,15 @@ def prepare_data_sets(
     ]
     ready = {held.path: held for held in current if held}
     progress(len(ready) / len(data_sets))
-    for done in pool.unordered(_prepare, stale) if stale else ():
+    problems = []
+    for done in pool.unordered(_prepare, stale):
         if isinstance(done, str):
-            raise RecordingError(done)
-        ready[done.path] = done
-        progress(len(ready) / len(data_sets))
+            problems.append(done)
+        else:
+            ready[done.path] = done
+        progress((len(ready) + len(problems)) / len(data_sets))
+    if problems:
+        raise RecordingError(min(problems))
     chosen = [_long_enough(ready[d.path], spec.min_path_m) for d in data_sets]
     with whole_file(folder / LIST) as temporary:
         temporary.write_text(json.dumps([asdict(d) for d in chosen], indent=1))

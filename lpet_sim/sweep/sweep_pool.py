@@ -52,6 +52,8 @@ class Pool:
             WorkerDiedError: A worker's process ended; what is not given is not done.
             LpetError: There is no such scheduler, or Dask is not installed.
         """
+        if not items:
+            return
         with self._backend() as (jobs, ahead):
             parallel = joblib.Parallel(
                 n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=ahead
