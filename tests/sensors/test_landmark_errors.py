@@ -115,7 +115,7 @@ def test_few_sightings_are_misnamed_as_often() -> None:
     """Where one alone is drawn in an image it takes the name of a landmark that was missed."""
     field = GROUND_ONLY.model_copy(update={"ground_per_m2": 0.05})
     changes = {"field": field, "visibility": ALL_IN_RANGE, "detection_probability": 0.7}
-    right = sensor(**changes)
+    right = sensor(period_s=0.1, **changes)
     seen = show_landmarks(DRIVE, MadeUpTerrain(), CAMERA, right, SEED)  # type: ignore[arg-type]
     wrong = right.model_copy(update={"misclassification_probability": 0.1})
     a, b = report(seen, right), report(seen, wrong)
