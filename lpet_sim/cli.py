@@ -106,6 +106,24 @@ def sense(
     wrote(out or run)
 
 
+@app.command("calibrate-sensor")
+def calibrate_sensor(
+    run: RecordingArgument,
+    out: Annotated[Path, typer.Option(help="The YAML to write.")] = Path("sensor.yaml"),
+    from_image: Annotated[
+        int, typer.Option(min=0, help="Leave out the images before this one.")
+    ] = 0,
+) -> None:
+    """Measure a recording's sightings at true poses: a landmark sensor that stands for them."""
+    from lpet_sim.evaluation.sensor_report import sensor_tables
+    from lpet_sim.sweep.calibrate import calibrate_file
+
+    with bar(f"measuring {run.name}") as progress:
+        found, paths = calibrate_file(run, out, from_image, progress)
+    print_tables(sensor_tables(found.fit, found.sensed))
+    wrote(*paths)
+
+
 @app.command()
 def estimate(
     run: RecordingArgument,

@@ -1,0 +1,203 @@
+"""Measure a recording's sensor, so that the landmark sensor can stand for its front end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from lpet_sim.errors import RecordingError
+from lpet_sim.evaluation.figures import save
+from lpet_sim.evaluation.sensor_fit import SensorFit, fit_sensor
+from lpet_sim.evaluation.sensor_report import plot_sensor
+from lpet_sim.evaluation.sighting_tracks import since
+from lpet_sim.outputs import whole_file
+from lpet_sim.progress import Progress, silent
+from lpet_sim.recording.arrays import Array
+from lpet_sim.recording.calibration import StereoCalibration
+from lpet_sim.recording.reader import read_recording
+from lpet_sim.recording.recording import Recording
+from lpet_sim.recording.trajectory import Trajectory
+from lpet_sim.sensors.landmark_spec import (
+    LandmarkFieldSpec,
+    LandmarkSensorSpec,
+    SightingNoiseSpec,
+    VisibilitySpec,
+)
+from lpet_sim.sweep.sensing import sense_recording
+
+_SURE: Final = 3.0
+"""A shared error enters the spec only if it is this many standard errors from none."""
+_DENSITY_MAX_PER_M2: Final = 10.0
+_PROBE_PER_M2: Final = 1.0
+_PROBE_PERIODS: Final = 8
+_SIGMA_MIN_PX: Final = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """A recording's sensor.
+
+    Attributes:
+        fit: What was measured.
+        spec: The landmark sensor that stands for it.
+        sensed: The landmark sensor on the same traverse, measured likewise; None for real data,
+            where no terrain is known.
+    """
+
+    fit: SensorFit
+    spec: LandmarkSensorSpec
+    sensed: SensorFit | None
+
+
+def calibrate_sensor(
+    recording: Recording, from_image: int = 0, seed: int = 0, progress: Progress = silent
+) -> Calibrated:
+    """Measure the sensor of a recording with truth and sightings.
+
+    For real data the truth is measured too: what all landmarks of an image have in common is then
+    left out of the noise.
+
+    Args:
+        recording: The recording.
+        from_image: Images before this one are left out.
+        seed: Seed of the landmarks that are strewn to find how dense they are.
+        progress: Called with the fraction done.
+
+    Raises:
+        RecordingError: The recording lacks truth, sightings or the stereo calibration.
+    """
+    truth, stereo = _known(recording)
+    assert recording.measurements.sightings is not None
+    simulated = recording.manifest.source == "simulation"
+    sightings = since(recording.measurements.sightings, from_image)
+    fit = fit_sensor(sightings, truth, stereo, settle=not simulated)
+    progress(0.6)
+    spec = sensor_spec(fit)
+    if not simulated:
+        return Calibrated(fit, spec, None)
+    spec = _with_density(spec, fit, recording, seed)
+    progress(0.8)
+    sensed = fit_sensor(sense_recording(recording, spec, seed), truth, stereo)
+    progress(1.0)
+    return Calibrated(fit, spec, sensed)
+
+
+def _known(recording: Recording) -> tuple[Trajectory, StereoCalibration]:
+    stereo = recording.measurements.calibration.stereo
+    recording.measurements.require("sightings")
+    if stereo is None:
+        raise RecordingError("the recording declares no stereo camera; give one that does")
+    if recording.truth is None:
+        raise RecordingError("the recording holds no truth: a sensor is measured at true poses")
+    return recording.truth.trajectory, stereo
+
+
+def sensor_spec(fit: SensorFit) -> LandmarkSensorSpec:
+    """Make the landmark sensor of measured figures; how dense landmarks are is left at its default.
+
+    A landmark of this sensor is found anew in each image, so the detection probability is how often
+    one in view is seen in the next image: two images then share as many as they did.
+    """
+    left, right, v = np.maximum(fit.noise.sigma_px, _SIGMA_MIN_PX)
+    sure = np.abs(fit.shared[:3]) > _SURE * fit.shared_se[:3]
+    disparity, focal, baseline = (float(x) for x in np.where(sure, fit.shared[:3], 0.0))
+    tracks, sure_fixed = fit.tracks, fit.noise.fixed_px[0] > _SURE * fit.noise.fixed_px[1]
+    return LandmarkSensorSpec(
+        period_s=tracks.period_s,
+        visibility=VisibilitySpec(
+            border_px=tracks.border_px,
+            range_min_m=float(tracks.range_m[0]),
+            range_max_m=float(tracks.range_m[-1]),
+            range_full_m=float(tracks.range_m[0]),
+            sightings_max=max(round(float(tracks.sightings.mean() / tracks.seen_next)), 1),
+        ),
+        noise=SightingNoiseSpec(
+            sigma_left_px=float(left),
+            sigma_right_px=float(right),
+            sigma_v_px=float(v),
+            bias_sigma_px=fit.noise.fixed_px[0] if sure_fixed else 0.0,
+            declared_sigma_px=fit.noise.declared_px,
+        ),
+        detection_probability=tracks.seen_next,
+        misclassification_probability=min(tracks.impossible, 0.99),
+        disparity_bias_px=disparity,
+        focal_scale_error=focal,
+        baseline_scale_error=baseline,
+    )
+
+
+def _with_density(
+    spec: LandmarkSensorSpec, fit: SensorFit, recording: Recording, seed: int
+) -> LandmarkSensorSpec:
+    """Strew as many landmarks as were seen, fading with range so that they cover images evenly.
+
+    A field holds only so many landmarks a square metre; where near ones would have to be denser,
+    they fade from further on, and their median range is larger than the one measured.
+    """
+    range_m, images = _probe(spec, recording, seed)
+    wanted = float(fit.tracks.sightings.mean()) / fit.tracks.seen_next * images
+
+    def shown(full_m: float) -> float:
+        return float(np.sum(np.minimum(1.0, full_m / range_m) ** spec.visibility.range_exponent))
+
+    most = _DENSITY_MAX_PER_M2 / _PROBE_PER_M2
+    steps = np.geomspace(spec.visibility.range_min_m, spec.visibility.range_max_m, 60)
+    full_m = next((x for x in steps if shown(x) * most >= wanted), steps[-1])
+    factor = min(wanted / max(shown(full_m), 1.0), most)
+    field = _probe_field().model_copy(
+        update={"ground_per_m2": _PROBE_PER_M2 * factor, "per_rock": _PROBE_PER_M2 * factor}
+    )
+    visibility = spec.visibility.model_copy(update={"range_full_m": float(full_m)})
+    return spec.model_copy(update={"field": field, "visibility": visibility})
+
+
+def _probe(spec: LandmarkSensorSpec, recording: Recording, seed: int) -> tuple[Array, int]:
+    """Give the ranges of all landmarks in view of a thin field [m], and the number of images."""
+    visibility = spec.visibility.model_copy(update={"sightings_max": None, "range_exponent": 0.0})
+    thin = LandmarkSensorSpec(
+        period_s=_PROBE_PERIODS * spec.period_s,
+        field=_probe_field(),
+        visibility=visibility,
+        noise=SightingNoiseSpec(sigma_left_px=0.0, sigma_right_px=0.0, sigma_v_px=0.0),
+        detection_probability=1.0,
+    )
+    sensed, stereo = (
+        sense_recording(recording, thin, seed),
+        recording.measurements.calibration.stereo,
+    )
+    assert stereo is not None
+    return np.linalg.norm(stereo.triangulate(sensed.stereo_px), axis=1), len(sensed)
+
+
+def _probe_field() -> LandmarkFieldSpec:
+    """Give a thin field, as many landmarks on a rock as on a square metre of ground."""
+    return LandmarkFieldSpec(ground_per_m2=_PROBE_PER_M2, per_rock=_PROBE_PER_M2)
+
+
+def calibrate_file(
+    path: Path, out: Path, from_image: int = 0, progress: Progress = silent
+) -> tuple[Calibrated, tuple[Path, ...]]:
+    """Measure a recording's sensor and write its spec (YAML) and figure (PNG).
+
+    Args:
+        path: The recording.
+        out: Where the spec goes; the figure lies beside it.
+        from_image: Images before this one are left out.
+        progress: Called with the fraction done.
+
+    Raises:
+        RecordingError: The recording cannot be read, or lacks what is needed.
+        OutputError: The files cannot be written.
+    """
+    recording = read_recording(path)
+    bare = replace(recording, measurements=replace(recording.measurements, images=None))
+    found = calibrate_sensor(bare, from_image, progress=progress)
+    picture = out.with_suffix(".png")
+    with whole_file(out) as temporary:
+        found.spec.to_yaml(temporary)
+    with whole_file(picture) as temporary:
+        save(plot_sensor(found.fit, found.sensed), temporary)
+    return found, (out, picture)
