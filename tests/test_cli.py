@@ -120,6 +120,7 @@ def test_a_file_that_is_not_there_is_named(lpet: Lpet, tmp_path: Path) -> None:
     assert_refused(lpet("simulate", f"{gone}.yaml"), f"{gone}.yaml", "YAML")
     assert_refused(lpet("terrain", f"{gone}.yaml"), f"{gone}.yaml", "YAML")
     assert_refused(lpet("import", "kitti", gone, tmp_path / "out.rrd"), str(gone))
+    assert_refused(lpet("import", "starry-night", gone, tmp_path / "out.rrd"), str(gone))
     for command in ("sight", "estimate", "evaluate", "view"):
         assert_refused(lpet(command, f"{gone}.rrd"), f"{gone}.rrd", "recording")
     assert list(tmp_path.iterdir()) == []
