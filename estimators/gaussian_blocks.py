@@ -151,16 +151,16 @@ def mirror_lower(P: Array) -> None:
                     P[j, i] = P[i, j]
 
 
-def update_in_place(P: Array, PH_T: Array, S: Array, innovation: Array) -> tuple[Array, float]:
-    """Take in a measurement whose ``P H^T`` is at hand, in Joseph's form multiplied out.
+def update_in_place(P: Array, HP: Array, S: Array, innovation: Array) -> tuple[Array, float]:
+    """Take in a measurement whose ``H P`` is at hand, by the square root of its innovation's S.
 
-    ``K = P H^T S^-1``; ``(I - K H) P (I - K H)^T + K cov_meas K^T`` is ``P - K D^T - D K^T`` with
-    ``D = P H^T - K S / 2``: for every K, not for the optimal one alone, so that an error of K
-    enters squared. One symmetric rank-2m product, the least that a full covariance costs.
+    ``S = L L^T``, ``W = L^-1 H P``: ``P+ = P - W^T W`` and ``dx = W^T L^-1 innovation``. One
+    triangular solve and one symmetric rank-m product, the least that a full covariance costs; what
+    is taken off is positive semidefinite whatever the rounding, and nothing is inverted.
 
     Args:
         P: Covariance, Shape (n, n), C-contiguous; changed.
-        PH_T: ``P H^T``, Shape (n, m), C-contiguous.
+        HP: ``H P``, Shape (m, n), C-contiguous; spoiled.
         S: Covariance of the innovation, Shape (m, m).
         innovation: Measured minus predicted, Shape (m,).
 
@@ -168,17 +168,18 @@ def update_in_place(P: Array, PH_T: Array, S: Array, innovation: Array) -> tuple
         The correction of the state, Shape (n,), and ``innovation^T S^-1 innovation``.
 
     Raises:
-        BrokenFilterError: S is not positive definite.
+        BrokenFilterError: S or the new P is not positive definite.
 
     Reference:
-        Bar-Shalom, Li, Kirubarajan (2001), eq. 5.2.3-18 [recalled].
+        Bar-Shalom, Li, Kirubarajan (2001), eq. 5.2.3-17 [recalled].
     """
     L, failed = lapack.dpotrf(S, lower=1)
     if failed:
         raise BrokenFilterError("the covariance of an innovation is not positive definite")
-    K_T, _ = lapack.dpotrs(L, PH_T.T, lower=1)
-    weighted, _ = lapack.dpotrs(L, innovation, lower=1)
-    D_T = blas.dgemm(-0.5, S, K_T, 1.0, PH_T.T)
-    blas.dsyr2k(-1.0, K_T, D_T, 1.0, P.T, trans=1, lower=0, overwrite_c=1)
+    W_T = blas.dtrsm(1.0, L, HP.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+    white = blas.dtrsv(L, innovation, lower=1)
+    blas.dsyrk(-1.0, W_T, beta=1.0, c=P.T, lower=0, overwrite_c=1)
     mirror_lower(P)
-    return K_T.T @ innovation, float(innovation @ weighted)
+    if P.diagonal().min() < 0.0:
+        raise BrokenFilterError("the covariance of the state is not positive definite")
+    return W_T @ white, float(white @ white)

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators import slam_kernels
+from estimators import slam_gate
 from estimators.frame_to_frame import declared_sightings
 from estimators.gaussian import chi_square_threshold
 from estimators.odometry_steps import image_odometry
@@ -28,6 +28,7 @@ from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.streams import Measurements, OdometryStream
 from lpet_sim.recording.trajectory import Trajectory
 
+Bools = NDArray[np.bool_]
 LOGGED = (
     "sightings",
     "accepted",
@@ -131,8 +132,8 @@ class SlamRun:
         slots = self.landmarks.slots(landmark_id)
         known = slots >= 0
         seen = self.state.innovations(slots[known], stereo_px[known], variance[known])
-        slipped, accepted = self._checked(seen)
-        nis = self._correct(seen.take(accepted)) if accepted.any() else 0.0
+        slipped, fits = self._gated(seen)
+        accepted, nis = self._taken_in(seen, fits)
         self.landmarks.count_image(seen.slots[accepted], seen.slots[~accepted])
         count = int(accepted.sum())
         new, dropped = self._renew(landmark_id[~known], stereo_px[~known], variance[~known])
@@ -160,35 +161,41 @@ class SlamRun:
         """Give what was logged of each image."""
         return {name: np.array(values) for name, values in self._log.items()}
 
-    def _checked(self, seen: Innovations) -> tuple[bool, NDArray[np.bool_]]:
-        """Tell whether odometry slipped, and which sightings fit by themselves and together."""
+    def _gated(self, seen: Innovations) -> tuple[bool, Bools]:
+        """Tell whether odometry slipped, and which sightings fit by themselves."""
         fits = self.state.squared_distances(seen) <= self._threshold
         slipped = len(seen) >= self._spec.sightings_min and fits.mean() < self._spec.slip_share
         if slipped:
             self.state.disturb(self._slip_noise())
             fits = self.state.squared_distances(seen) <= self._threshold
-        if self._spec.association_check == "none" or fits.sum() < 2:
-            return slipped, fits
+        return bool(slipped), fits
+
+    def _taken_in(self, seen: Innovations, fits: Bools) -> tuple[Bools, float]:
+        """Correct the state by the sightings that fit together; gives which, and their NIS."""
+        if not fits.any():
+            return fits, 0.0
         candidates = seen.take(fits)
-        _, S = self.state.joint(candidates)
-        support = np.empty(len(candidates))
-        slam_kernels.consensus(S, candidates.r, self._threshold, support)
-        together = np.zeros(len(seen), dtype=bool)
-        together[np.flatnonzero(fits)[support > 0]] = True
-        return slipped, together
+        r, (HP, S) = candidates.r, self.state.joint(candidates)
+        accepted = fits
+        if self._spec.association_check != "none":
+            together = np.empty(len(candidates))
+            slam_gate.consensus(S, r, self._threshold, together)
+            agree = together > 0
+            if not agree.all():
+                rows = np.repeat(agree, 3)
+                r, HP, S = r[agree], HP[rows], S[np.ix_(rows, rows)]
+                accepted = np.zeros_like(fits)
+                accepted[np.flatnonzero(fits)[agree]] = True
+        nis = self.state.correct(r, HP, S)
+        if self._spec.coupling != "coupled":
+            self.state.decouple(self._spec.coupling == "decoupled_pose_kept")
+        return accepted, nis
 
     def _slip_noise(self) -> Array:
         """Give the noise of a step that is believed to within its own length only."""
         spec, sizes = self._spec, np.linalg.norm(self._twist.reshape(2, 3), axis=1)
         least = spec.slip_sigma_m, spec.slip_sigma_rad
         return np.diag(np.repeat(np.maximum(sizes, least), 3))
-
-    def _correct(self, seen: Innovations) -> float:
-        PH_T, S = self.state.joint(seen)
-        nis = self.state.correct(seen, PH_T, S)
-        if self._spec.coupling != "coupled":
-            self.state.decouple(self._spec.coupling == "decoupled_pose_kept")
-        return nis
 
     def _renew(self, landmark_id: Ints, stereo_px: Array, variance: Array) -> tuple[int, int]:
         """Let landmarks leave and enter; gives how many entered and left."""

@@ -129,7 +129,7 @@ class SlamSpec(Spec):
     anchors: AnchorSpec | None = None
     formulation: Literal["standard", "first_estimates", "right_invariant"] = "right_invariant"
     landmark_frame: Literal["world", "keyframe"] = "keyframe"
-    keyframe_m: Annotated[float, Field(gt=0.0)] = 0.5
+    keyframe_m: Annotated[float, Field(gt=0.0)] = 1.0
     keyframe_rad: Annotated[float, Field(gt=0.0)] = 0.2
     association_check: Literal["none", "one_point_ransac"] = "one_point_ransac"
     gate_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.999

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators import gaussian, gaussian_blocks, slam_kernels
+from estimators import gaussian, gaussian_blocks, slam_gate, slam_kernels
 from estimators.jacobians import hat, se3_exp
 from estimators.observation import camera_vector, transfer
 from estimators.slam_kernels import FIRST_ESTIMATES, RELATIVE, RIGHT_INVARIANT, STANDARD
@@ -157,20 +157,26 @@ class SlamState:
     def squared_distances(self, seen: Innovations) -> Array:
         """Give the squared Mahalanobis distance of each sighting by itself, Shape (m,)."""
         out = np.empty(len(seen))
-        slam_kernels.gate(self.P, seen.rows, seen.r, seen.H, seen.G, seen.variance, out)
+        slam_gate.gate(self.P, seen.rows, seen.r, seen.H, seen.G, seen.variance, out)
         return out
 
     def joint(self, seen: Innovations) -> tuple[Array, Array]:
-        """Give ``P H'``, Shape (n, 3 m), and the innovations' covariance, Shape (3 m, 3 m)."""
-        PH_T = np.empty((len(self.P), 3 * len(seen)))
+        """Give ``H P``, Shape (3 m, n), and the innovations' covariance, Shape (3 m, 3 m)."""
+        HP = np.empty((3 * len(seen), len(self.P)))
         S = np.empty((3 * len(seen), 3 * len(seen)))
-        slam_kernels.project_covariance(self.P, seen.rows, seen.H, seen.G, PH_T)
-        slam_kernels.innovation_covariance(PH_T, seen.rows, seen.H, seen.G, seen.variance, S)
-        return PH_T, S
+        slam_gate.project_covariance(self.P, seen.rows, seen.H, seen.G, HP)
+        slam_gate.innovation_covariance(HP, seen.rows, seen.H, seen.G, seen.variance, S)
+        return HP, S
 
-    def correct(self, seen: Innovations, PH_T: Array, S: Array) -> float:
-        """Take sightings in and give their normalised innovation squared."""
-        dx, nis = gaussian_blocks.update_in_place(self.P, PH_T, S, seen.r.ravel())
+    def correct(self, r: Array, HP: Array, S: Array) -> float:
+        """Take sightings in and give their normalised innovation squared.
+
+        Args:
+            r: Seen minus predicted [px], Shape (m, 3).
+            HP: As `joint` gives it; spoiled.
+            S: Likewise.
+        """
+        dx, nis = gaussian_blocks.update_in_place(self.P, HP, S, r.ravel())
         turn, shift = se3_exp(np.ascontiguousarray(dx[:POSE]))
         m = self.landmarks
         m.x += dx[POSE:].reshape(-1, 3) * m.alive[:, None]
