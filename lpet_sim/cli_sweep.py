@@ -15,7 +15,12 @@ def sweep(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Its folder; out/NAME if absent.")
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Processes of this machine.")] = 2,
+    workers: Annotated[
+        int,
+        typer.Option(
+            min=1, help="Processes of this machine, or how many workers the scheduler has."
+        ),
+    ] = 2,
     scheduler: Annotated[
         str | None,
         typer.Option(metavar="tcp://HOST:PORT", help="A Dask scheduler, in place of processes."),
@@ -40,7 +45,11 @@ def sweep(
     folder = Path("out") / read.name if out is None else out
     pool = Pool(workers, scheduler)
     with two_bars("data sets", "runs") as (driving, count):
-        result = run_sweep(read, folder, pool, limit, retry_failed, driving, count)
+        try:
+            result = run_sweep(read, folder, pool, limit, retry_failed, driving, count)
+        except KeyboardInterrupt:
+            say("stopped: the same command goes on from here")
+            raise
     noted = noted_table(result.data_sets)
     print_tables([*([] if noted is None else [noted]), sweep_table(read.name, result.rows)])
     say(f"ran {result.ran} runs, {len(result.rows) - result.ran} were there")

@@ -99,6 +99,6 @@ def _named(planned: PlannedRow, store: RowStore) -> Row:
         "variant_order": planned.variant.order,
         "spec": json.dumps(planned.variant.spec),
     }
-    none = {"bound_m": math.nan, "bound_rad": math.nan}
+    none = {"bound_m": math.nan, "bound_rad": math.nan, "bound_text": ""}
     bound = store.bounds.get(planned.job, none)
     return names | store.rows[planned.key] | {name: bound[name] for name in none}

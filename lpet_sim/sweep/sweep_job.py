@@ -13,13 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from estimators.odometry_steps import image_odometry
-from lpet_sim.errors import RecordingError
+from lpet_sim.errors import LpetError, RecordingError
 from lpet_sim.evaluation.bounds import end_bound
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.recording.streams import Measurements
 from lpet_sim.sweep.miscalibration import miscalibrate
 from lpet_sim.sweep.sensing import sense_recording
-from lpet_sim.sweep.sweep_once import PlannedRun, RunSettings, Scene, run_row, said
+from lpet_sim.sweep.sweep_once import PlannedRun, RunSettings, Scene, run_row, said, worker_name
+from lpet_sim.sweep.sweep_plan import code_digest
 from lpet_sim.sweep.sweep_spec import ArmSpec
 from lpet_sim.sweep.sweep_store import Journal, RowStore
 
@@ -54,9 +55,13 @@ def run_job(job: Job) -> int:
 
     Returns:
         How many runs were run.
+
+    Raises:
+        LpetError: This worker does not see the sweep's files, or has other code than the driver.
     """
     if job.settings.is_local:
         _end_with_parent()
+    _check_worker(job)
     store = RowStore(job.settings.folder).refresh(job.key)
     missing = store.missing([run.key for run in job.runs], job.settings.redo)
     todo = [run for run in job.runs if run.key in missing]
@@ -65,6 +70,21 @@ def run_job(job: Job) -> int:
         with Journal(job.settings.folder, job.key) as journal:
             _run_all(job, todo, wants_bound, journal)
     return len(todo)
+
+
+def _check_worker(job: Job) -> None:
+    """Hold this worker to have what the driver has: a row must not tell of other code."""
+    for path in (job.recording, job.settings.folder):
+        if not path.exists():
+            raise LpetError(
+                f"worker {worker_name()} sees no {path}: all workers must see the data sets and "
+                "the sweep's folder under the same names as the driver"
+            )
+    if code_digest(True) != job.settings.code:
+        raise LpetError(
+            f"worker {worker_name()} has other source code than the driver: install the same on "
+            "all machines, or start the sweep again if the code was changed while it ran"
+        )
 
 
 def _run_all(job: Job, todo: Sequence[PlannedRun], wants_bound: bool, journal: Journal) -> None:
@@ -119,18 +139,18 @@ def bound_of(scene: Scene | str) -> dict[str, Any]:
     """Give the Cramer-Rao bound of a job, or NaN with the reason why there is none."""
     none = {"bound_m": math.nan, "bound_rad": math.nan}
     if isinstance(scene, str):
-        return none | {"text": scene}
+        return none | {"bound_text": scene}
     told = scene.measurements
     if told.sightings is None or told.calibration.stereo is None:
-        return none | {"text": "there are no sightings of a declared stereo camera"}
+        return none | {"bound_text": "there are no sightings of a declared stereo camera"}
     try:
         at_images = scene.truth.trajectory.at(told.sightings.t_ns)
         bound = end_bound(at_images, told.sightings, told.calibration.stereo, told.odometry)
     except Exception as error:
-        _log.warning("no bound: %s", said(error))
-        return none | {"text": said(error)}
+        _log.debug("no bound", exc_info=True)
+        return none | {"bound_text": said(error)}
     rms = {"bound_m": bound.position_rms_m, "bound_rad": bound.attitude_rms_rad}
-    return rms | {"text": ""}
+    return rms | {"bound_text": ""}
 
 
 def _end_with_parent() -> None:

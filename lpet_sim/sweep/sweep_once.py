@@ -58,6 +58,7 @@ class RunSettings:
         odometry: ``fused`` or ``wheels``.
         redo: Which runs are run again although there is a row of them.
         driver: Names the call of the sweep on whose behalf they run.
+        code: Names the source code that the driver has, as `sweep_plan.code_digest` does.
         folder: Where rows are kept.
         is_local: Whether the workers are children of the driver, and end with it.
     """
@@ -67,6 +68,7 @@ class RunSettings:
     odometry: str
     redo: Redo
     driver: str
+    code: str
     folder: Path
     is_local: bool = True
 

@@ -16,7 +16,7 @@ Work = TypeVar("Work")
 Done = TypeVar("Done")
 
 
-class WorkerDiedError(Exception):
+class WorkerDiedError(LpetError):
     """A worker's process ended in the midst of its work: killed, out of memory, or crashed."""
 
 
@@ -61,7 +61,8 @@ class Pool:
             try:
                 yield from parallel(joblib.delayed(do)(item) for item in items)
             except _deaths() as error:
-                raise WorkerDiedError(str(error)) from None
+                said = " ".join(str(error).split())
+                raise WorkerDiedError(f"a worker's process died: {said}") from None
 
     @contextmanager
     def _backend(self) -> Iterator[tuple[int, int | str]]:

@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Final
 
 import lpet_sim
-from lpet_sim.errors import LpetError, OutputError
+from lpet_sim.errors import LpetError, OutputError, SpecError
 from lpet_sim.evaluation.result import EXCEPTION
 from lpet_sim.outputs import output_folder
 from lpet_sim.progress import Count, Progress, silent, uncounted
 from lpet_sim.sweep.sweep_agenda import PlannedRow, jobs_of, plan_rows, rows_of
-from lpet_sim.sweep.sweep_data import DataSet, find_data_sets, prepare_data_sets
+from lpet_sim.sweep.sweep_data import LIST, DataSet, find_data_sets, prepare_data_sets
 from lpet_sim.sweep.sweep_job import Job, run_job
 from lpet_sim.sweep.sweep_once import RunSettings, failure_row, now
 from lpet_sim.sweep.sweep_plan import code_digest, expand
@@ -86,17 +86,21 @@ def run_sweep(
     found = find_data_sets(spec.data_sets, folder.resolve())[:limit]
     with _alone_in(output_folder(folder.resolve())) as home:
         data_sets = prepare_data_sets(spec.data_sets, found, home, pool, driving)
-        planned = list(plan_rows(spec, variants, [d for d in data_sets if not d.left_out]))
+        used = [data_set for data_set in data_sets if not data_set.left_out]
+        if not used:
+            raise SpecError(f"no data set is left to run on: {home / LIST} says why")
+        planned = list(plan_rows(spec, variants, used))
         redo = Redo(spec.time_limit_s, now() if retry_failed else "")
         settings = _settings(spec, redo, home, pool.is_local)
-        store = RowStore(home / JOURNALS).refresh()
+        store = RowStore(settings.folder).refresh()
         ran = len(store.missing([p.key for p in planned], redo))
         try:
-            with _counting(store.folder, planned, redo, count):
+            with _counting(settings.folder, planned, redo, count):
                 _run_missing(spec, planned, settings, pool)
         finally:
-            rows = rows_of(planned, RowStore(home / JOURNALS).refresh(), redo)
-            write_table(home / TABLE, rows, _about(spec, data_sets))
+            rows = rows_of(planned, store.refresh(), redo)
+            if rows:
+                write_table(home / TABLE, rows, _about(spec, data_sets))
     return SweepResult(home / TABLE, tuple(rows), tuple(data_sets), ran)
 
 
@@ -107,7 +111,8 @@ def _settings(spec: SweepSpec, redo: Redo, home: Path, is_local: bool) -> RunSet
         odometry=spec.odometry,
         redo=redo,
         driver=uuid.uuid4().hex[:12],
-        folder=home / JOURNALS,
+        code=code_digest(True),
+        folder=output_folder(home / JOURNALS),
         is_local=is_local,
     )
 
@@ -116,18 +121,23 @@ def _run_missing(
     spec: SweepSpec, planned: Sequence[PlannedRow], settings: RunSettings, pool: Pool
 ) -> None:
     """Have the missing runs done; one whose process dies is tried once more, alone, and fails."""
-    deaths = 0
-    while jobs := jobs_of(spec, planned, settings, pool.workers):
+    jobs, deaths = jobs_of(spec, planned, settings, pool.workers), 0
+    while jobs:
         try:
             for _ in pool.unordered(run_job, jobs):
                 deaths = 0
-            return
-        except WorkerDiedError as error:
+        except WorkerDiedError:
             suspects, deaths = _suspects(jobs, settings), deaths + 1
             if not suspects and deaths == _DEATHS_MAX:
-                raise LpetError(f"workers die before their first run: {error}") from None
-        for job in suspects:
-            _run_alone(job, pool)
+                raise
+            for job in suspects:
+                _run_alone(job, pool)
+        done, jobs = jobs, jobs_of(spec, planned, settings, pool.workers)
+        if jobs == done and not deaths:
+            raise LpetError(
+                f"rows of {len(jobs)} jobs did not come to {settings.folder}: all workers must see "
+                "the sweep's folder under the same name as the driver"
+            )
 
 
 def _suspects(jobs: Sequence[Job], settings: RunSettings) -> list[Job]:
@@ -163,14 +173,19 @@ def _alone_in(folder: Path) -> Iterator[Path]:
     """
     lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        _take_lock(lock, folder)
         yield folder
+    finally:
+        os.close(lock)
+
+
+def _take_lock(lock: int, folder: Path) -> None:
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise OutputError(
             f"another sweep is writing to {folder}; wait for it, or give another --out"
         ) from None
-    finally:
-        os.close(lock)
 
 
 @contextmanager

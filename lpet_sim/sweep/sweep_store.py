@@ -20,7 +20,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from lpet_sim.evaluation.result import EXCEPTION, TIMEOUT
-from lpet_sim.outputs import output_folder, whole_file
+from lpet_sim.outputs import whole_file
 
 TIMING: Final = ("time_total_s", "time_per_image_ms", "cold", "worker", "started_at")
 """Columns in which two runs of the same sweep may differ."""
@@ -88,7 +88,6 @@ class Journal:
 
     def _write(self, event: Mapping[str, Any]) -> None:
         if self._descriptor is None:
-            output_folder(self._path.parent)
             flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND
             self._descriptor = os.open(self._path, flags, 0o644)
         os.write(self._descriptor, json.dumps(event).encode() + b"\n")
@@ -179,6 +178,6 @@ def _column(name: str, rows: Sequence[Row]) -> pa.Array:
     known = next((value for value in values if value is not None), None)
     kinds = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), list: pa.list_(pa.float64())}
     kind = kinds.get(type(known), pa.string())
-    if any(isinstance(value, float) for value in values):
+    if known is None or any(isinstance(value, float) for value in values):
         kind = pa.float64()
     return pa.array(values, type=kind)

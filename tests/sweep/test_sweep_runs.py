@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from lpet_sim.errors import LpetError, SpecError
 from lpet_sim.evaluation.rows import read_rows
 from lpet_sim.sweep import sweep_run
 from lpet_sim.sweep.sweep_pool import Pool
@@ -191,6 +192,42 @@ def test_what_goes_wrong_in_a_run_is_a_kind_of_failure_of_its_row(
     assert {row["failure_text"] for row in retried.rows if row["failure"] == "timeout"} == {
         "stopped after 5.1 s"
     }
+
+
+def test_failed_runs_are_run_again_only_when_asked(
+    recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What lacked something in its first run has a second chance; what went well has none."""
+    monkeypatch.setattr(sweep_run, "run_job", run_faulty_job)
+    sets = {"recordings": [str(recordings / "set1.rrd")]}
+    mapping = small_sweep(recordings, data_sets=sets, arms={"a": None})
+    mapping["variants"] = [{"estimator": "faulty"}, {"estimator": "dead_reckoning"}]
+    with faulty_known():
+        spec = SweepSpec.from_mapping(mapping)
+        assert run_sweep(spec, tmp_path).ran == 2
+        assert run_sweep(spec, tmp_path).ran == 0
+        again = run_sweep(spec, tmp_path, retry_failed=True)
+    assert (again.ran, len(again.rows)) == (1, 2)
+
+
+def test_a_worker_without_the_files_or_the_code_of_the_driver_ends_the_sweep(
+    recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A row must not tell of code that it was not made by."""
+    sets = {"recordings": [str(recordings / "set1.rrd")]}
+    spec = SweepSpec.from_mapping(small_sweep(recordings, data_sets=sets))
+    monkeypatch.setattr(sweep_run, "code_digest", lambda sensing: "another")
+    with pytest.raises(LpetError, match="has other source code than the driver"):
+        run_sweep(spec, tmp_path / "code")
+    monkeypatch.setattr(sweep_run, "JOURNALS", "gone")
+    monkeypatch.setattr(sweep_run, "output_folder", lambda path: path)
+    (tmp_path / "files").mkdir()
+    with pytest.raises(LpetError, match=r"sees no .*gone"):
+        run_sweep(spec, tmp_path / "files")
+    short = {"recordings": sets["recordings"], "min_path_m": 9.0}
+    none = SweepSpec.from_mapping(small_sweep(recordings, data_sets=short))
+    with pytest.raises(SpecError, match=r"no data set is left to run on: .*data_sets.json"):
+        run_sweep(none, tmp_path / "files")
 
 
 def test_a_time_limit_stops_work_in_any_thread_and_leaves_what_is_in_time_alone() -> None:
