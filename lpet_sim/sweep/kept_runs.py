@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from estimators import build_estimator
+from lpet_sim.errors import BrokenFilterError
 from lpet_sim.evaluation import EvaluationSpec, RunResult, evaluate, failed
+from lpet_sim.evaluation.result import BAD_COVARIANCE, EXCEPTION
 from lpet_sim.outputs import whole_file
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.recording import Recording
@@ -61,7 +63,8 @@ def code_key(*packages: str) -> str:
 def run_kept(job: Job, recording: Recording, folder: Path) -> Row:
     """Run an estimator and score it, or give the row that was kept.
 
-    An exception is a row with the failure kind ``exception``, and not kept.
+    An exception is a row too, with the failure kind ``exception``, or ``bad_covariance`` where a
+    filter broke; it is not kept.
 
     Args:
         job: What to run.
@@ -76,7 +79,8 @@ def run_kept(job: Job, recording: Recording, folder: Path) -> Row:
         estimate = build_estimator(job.estimator, job.fields).estimate(recording.measurements)
     except Exception as error:
         _log.warning("%s: %s", job.label, error)
-        return _named(job, failed(job.label, text=f"{type(error).__name__}: {error}"))
+        kind = BAD_COVARIANCE if isinstance(error, BrokenFilterError) else EXCEPTION
+        return _named(job, failed(job.label, kind, f"{type(error).__name__}: {error}"))
     row = score_row(job, recording, estimate) | {"time_s": time.perf_counter() - begin}
     with whole_file(file) as temporary:
         temporary.write_text(json.dumps(row))

@@ -120,6 +120,21 @@ def test_the_data_set_is_sparse_where_it_is_said_to_be(recording: Recording) -> 
     assert standing > 50 and set(seen[:standing]) == {3}
 
 
+def test_the_motion_capture_jumps_once_and_the_gyro_errs_over_gaps(recording: Recording) -> None:
+    """The pose of one image is turned by 37 deg; missing images make the other large steps."""
+    T, odometry = recording.truth.body.T_world_body, recording.measurements.odometry
+    read, t_s = SE3.exp(odometry.twist), recording.truth.body.t_s
+    misfit = (read[1:].inverse() @ (T[:-1].inverse() @ T[1:])).log()
+    turn_deg = np.degrees(np.linalg.norm(misfit[:, 3:], axis=1))
+    over_two = (read[91] @ read[92]).inverse() @ (T[90].inverse() @ T[92])
+    assert turn_deg[90] == pytest.approx(37, abs=0.5) and turn_deg[91] > 37
+    assert np.degrees(np.linalg.norm(over_two.log()[3:])) < 5
+    large = np.setdiff1d(np.flatnonzero(turn_deg > 10), [90, 91])
+    assert np.diff(t_s)[large].min() > 0.2
+    assert turn_deg[large].max() == pytest.approx(30, abs=0.5)
+    assert np.diff(t_s).max() == pytest.approx(0.735, abs=0.001)
+
+
 def test_rows_that_differ_can_be_left_out(folder: Path, recording: Recording) -> None:
     """A front end's epipolar limit takes away sightings, and what is left is less noisy."""
     limited = import_starry_night(folder, StarryNightSpec(epipolar_px=1.5)).measurements
