@@ -35,10 +35,8 @@ from lpet_sim.recording.starry_night import (
     import_starry_night,
     read_starry_night,
 )
-from lpet_sim.recording.streams import OdometryStream, SightingStream
-from lpet_sim.recording.truth import BodyTruth, Truth
 from lpet_sim.sweep.importing import import_kitti
-from lpet_sim.sweep.kept_runs import Job, Row, code_key, run_kept
+from lpet_sim.sweep.kept_runs import Job, Row, code_key, first_images, run_kept
 from lpet_sim.sweep.sighting import sight_recording
 from lpet_sim.terminal import bar
 from lpet_sim.vision.spec import FrontEndSpec
@@ -130,20 +128,6 @@ def night(arm: str, quick: bool) -> Recording:
     return first_images(recording, QUICK_IMAGES) if quick else recording
 
 
-def first_images(recording: Recording, count: int) -> Recording:
-    """Cut a recording whose odometry and truth have the times of its images."""
-    m, truth = recording.measurements, recording.truth
-    assert m.sightings is not None and m.odometry is not None and truth is not None
-    s, o, b, rows = m.sightings, m.odometry, truth.body, slice(0, m.sightings.offsets[count])
-    seen = (s.landmark_id[rows], s.stereo_px[rows], s.sigma_px[rows])
-    sightings = SightingStream(s.t_ns[:count], s.offsets[: count + 1], *seen)
-    t_ns, twist = o.t_ns[:count], o.twist[:count]
-    odometry = OdometryStream(t_ns, twist, o.variance[:count], o.scale_sigma[:count])
-    body = BodyTruth.from_poses(b.t_ns[:count], b.T_world_body[:count])
-    cut = replace(m, sightings=sightings, odometry=odometry)
-    return replace(recording, measurements=cut, truth=Truth(body))
-
-
 def kitti(progress: Progress) -> Recording:
     """Import and sight KITTI's pairs, or take what was made of them before."""
     path = output_folder(KEPT) / f"kitti_{code_key('lpet_sim/vision')}.rrd"
@@ -226,7 +210,7 @@ def summary(rows: list[Row], nights: dict[str, Recording]) -> list[str]:
         if chosen:
             facts = [_facts(arm, nights[arm]) for arm in nights] if "night" in data_set else []
             lines += [f"## {title}, {chosen[0].get('distance_m', math.nan):.1f} m", "", *facts]
-            lines += [*([_JUMP, ""] if facts else []), *_table(chosen), ""]
+            lines += [*([_JUMP, *_remarks(chosen), ""] if facts else []), *_table(chosen), ""]
     return lines
 
 
@@ -243,6 +227,24 @@ def _facts(arm: str, recording: Recording) -> str:
         f"fewer than three landmarks, {np.mean(count == 0):.0%} none; {standing} landmark in the "
         f"{truth.body.t_s[moving]:.1f} s of standstill"
     )
+
+
+def _remarks(rows: list[Row]) -> list[str]:
+    """Tell what frame-to-frame and the observable form make of so little in view."""
+    by_name = {row["variant"]: row for row in rows if row["arm"] == RAW and "rmse_m" in row}
+    blind = [row for name, row in by_name.items() if name.startswith("frame_to_frame")]
+    said = ", ".join(f"{r['bridged_share']:.0%} with RMS {r['rmse_m']:.2f} m" for r in blind)
+    lines = [
+        f"- frame-to-frame bridges {said}; gyro and velocity: {by_name['odometry']['rmse_m']:.2f} m"
+    ]
+    for name, row in by_name.items():
+        without = by_name.get(name.replace("-observable", "-unobservable"))
+        if "-observable" in name and without is not None:
+            lines.append(
+                f"- the anchor of {name} is seen in {row['anchors_seen_share']:.0%} of the images: "
+                f"RMS {row['rmse_m']:.3f} m with it, {without['rmse_m']:.3f} m without"
+            )
+    return lines
 
 
 def _table(rows: list[Row]) -> list[str]:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import logging
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,8 @@ from lpet_sim.evaluation.result import BAD_COVARIANCE, EXCEPTION
 from lpet_sim.outputs import whole_file
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.recording import Recording
+from lpet_sim.recording.streams import OdometryStream, SightingStream
+from lpet_sim.recording.truth import BodyTruth, Truth
 
 Row = dict[str, Any]
 
@@ -58,6 +60,20 @@ def code_key(*packages: str) -> str:
     """Give a short name for the state of some of the product's code, such as ``estimators``."""
     files = [path for package in packages for path in sorted((_ROOT / package).rglob("*.py"))]
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:12]
+
+
+def first_images(recording: Recording, count: int) -> Recording:
+    """Cut a recording whose odometry and truth have the times of its images."""
+    m, truth = recording.measurements, recording.truth
+    assert m.sightings is not None and m.odometry is not None and truth is not None
+    s, o, b, rows = m.sightings, m.odometry, truth.body, slice(0, m.sightings.offsets[count])
+    seen = (s.landmark_id[rows], s.stereo_px[rows], s.sigma_px[rows])
+    sightings = SightingStream(s.t_ns[:count], s.offsets[: count + 1], *seen)
+    t_ns, twist = o.t_ns[:count], o.twist[:count]
+    odometry = OdometryStream(t_ns, twist, o.variance[:count], o.scale_sigma[:count])
+    body = BodyTruth.from_poses(b.t_ns[:count], b.T_world_body[:count])
+    cut = replace(m, sightings=sightings, odometry=odometry)
+    return replace(recording, measurements=cut, truth=Truth(body))
 
 
 def run_kept(job: Job, recording: Recording, folder: Path) -> Row:
