@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -54,6 +55,8 @@ class Pool:
         """
         if not items:
             return
+        # A process that has grown by 300 MB is replaced between two items, which harms nothing.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
         with self._backend() as (jobs, ahead):
             parallel = joblib.Parallel(
                 n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=ahead
