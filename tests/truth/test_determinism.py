@@ -73,7 +73,7 @@ def test_another_process_makes_the_same_recording_to_the_bit(
     assert second.truth is not None and first.truth is not None
     assert second.truth.events == first.truth.events
     assert all(np.array_equal(a, b) for a, b in zip(pairs(first), pairs(second), strict=True))
-    for name in ESTIMATORS:
+    for name in (n for n in ESTIMATORS if "odometry" not in build_estimator(n).needs):
         a, b = (build_estimator(name).estimate(r.measurements) for r in (first, second))
         assert a.trajectory.equals(b.trajectory)
         assert a.covariance is not None and b.covariance is not None
