@@ -57,6 +57,30 @@ def add_noise(P: Array, B_T: Array) -> None:
 
 
 @njit(cache=True)
+def carry(P: Array, B_T: Array, first: int) -> None:
+    """Let variables of the state act on others, in place: ``x += B d`` for consecutive ones d.
+
+    Args:
+        P: Covariance, Shape (n, n); changed.
+        B_T: B transposed, zero in the columns of d, Shape (k, n).
+        first: Row of the first of d.
+    """
+    n, k = len(P), len(B_T)
+    for i in range(n):
+        for a in range(k):
+            factor = B_T[a, i]
+            if factor != 0.0:
+                for j in range(n):
+                    P[i, j] += factor * P[first + a, j]
+    for j in range(n):
+        for a in range(k):
+            factor = B_T[a, j]
+            if factor != 0.0:
+                for i in range(n):
+                    P[i, j] += factor * P[i, first + a]
+
+
+@njit(cache=True)
 def join_block(P: Array, row: int, known: Ints, J: Array, B: Array) -> None:
     """Let three free variables become ``J x + B noise`` of others x, in place.
 

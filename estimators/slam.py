@@ -7,7 +7,7 @@ observable filter stands at the start every landmark stays, and those seen best 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -18,11 +18,13 @@ from estimators.frame_to_frame import declared_sightings
 from estimators.gaussian import chi_square_threshold
 from estimators.odometry_steps import image_odometry
 from estimators.retention import build_policy, choose_anchors, expired_anchors
-from estimators.slam_map import LandmarkMap
+from estimators.slam_iterate import relinearised
+from estimators.slam_map import LASTING, LandmarkMap
 from estimators.slam_spec import BoundedQueue, SlamSpec
-from estimators.slam_state import Innovations, SlamState
+from estimators.slam_state import SlamState
+from estimators.slam_values import Innovations, Step
 from lpet_sim.geometry import SE3
-from lpet_sim.recording.arrays import Array, Ints
+from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
 from lpet_sim.recording.calibration import StereoCalibration
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.streams import Measurements, OdometryStream
@@ -82,10 +84,12 @@ class Slam:
         known = measurements.odometry is not None or measurements.wheels is not None
         odometry = image_odometry(measurements, sightings.t_ns) if known else None
         start = measurements.calibration.T_world_body_start.se3()
-        run = SlamRun(self.spec, start, calibration)
+        imu = measurements.calibration.imu
+        rate_sigma_radps = 0.0 if imu is None else imu.gyro_bias_radps
+        run = SlamRun(self.spec, start, calibration, rate_sigma_radps)
         poses, covariance = list[SE3](), list[Array]()
         for k in range(len(sightings)):
-            run.advance(*_step(odometry, k, poses, self.spec))
+            run.advance(_step(odometry, k, poses, self.spec))
             rows = sightings.rows(k)
             stereo_px, sigma_px = sightings.stereo_px[rows], sightings.sigma_px[rows]
             run.see(sightings.landmark_id[rows], stereo_px, sigma_px)
@@ -102,20 +106,27 @@ class SlamRun:
         state: Pose, map and covariance.
     """
 
-    def __init__(self, spec: SlamSpec, start: SE3, calibration: StereoCalibration) -> None:
+    def __init__(
+        self,
+        spec: SlamSpec,
+        start: SE3,
+        calibration: StereoCalibration,
+        rate_sigma_radps: float = 0.0,
+    ) -> None:
         self._spec = spec
-        self.state = SlamState(start, calibration, spec)
+        self.state = SlamState(start, calibration, spec, rate_sigma_radps)
         self._policy = build_policy(spec.retention)
         self._threshold = chi_square_threshold(3, spec.gate_probability)
         self._standing = spec.anchors is not None
         self._driven = SE3.identity()
-        self._twist = np.zeros(6)
+        self._unfixed = np.zeros(6)
         self._log: dict[str, list[float]] = {name: [] for name in LOGGED}
 
-    def advance(self, twist: Array, noise: Array) -> None:
+    def advance(self, step: Step) -> None:
         """Move by odometry; when an observable filter sets off it chooses its anchors."""
-        self.state.advance(twist, self._spec.noise_scale * noise)
-        self._twist = twist
+        self.state.advance(replace(step, noise=self._spec.noise_scale * step.noise))
+        twist = step.twist
+        self._unfixed = self._unfixed + np.abs(twist)
         if self._standing and self._spec.anchors is not None:
             self._driven = self._driven @ SE3.exp(twist)
             moved = np.linalg.norm(self._driven.log().reshape(2, 3), axis=1)
@@ -132,10 +143,14 @@ class SlamRun:
         slots = self.landmarks.slots(landmark_id)
         known = slots >= 0
         seen = self.state.innovations(slots[known], stereo_px[known], variance[known])
-        slipped, fits = self._gated(seen)
+        slipped, seen, fits = self._gated(seen)
         accepted, nis = self._taken_in(seen, fits)
-        self.landmarks.count_image(seen.slots[accepted], seen.slots[~accepted])
         count = int(accepted.sum())
+        # Where most do not fit it is the pose that is wrong, not the landmarks.
+        blamed = seen.slots[~accepted] if 2 * count > len(seen) else seen.slots[:0]
+        self.landmarks.count_image(seen.slots[accepted], blamed)
+        if count >= self._spec.sightings_min:
+            self._unfixed = np.zeros(6)
         new, dropped = self._renew(landmark_id[~known], stereo_px[~known], variance[~known])
         self._note(
             sightings=len(slots),
@@ -161,14 +176,17 @@ class SlamRun:
         """Give what was logged of each image."""
         return {name: np.array(values) for name, values in self._log.items()}
 
-    def _gated(self, seen: Innovations) -> tuple[bool, Bools]:
+    def _gated(self, seen: Innovations) -> tuple[bool, Innovations, Bools]:
         """Tell whether odometry slipped, and which sightings fit by themselves."""
         fits = self.state.squared_distances(seen) <= self._threshold
-        slipped = len(seen) >= self._spec.sightings_min and fits.mean() < self._spec.slip_share
-        if slipped:
-            self.state.disturb(self._slip_noise())
+        if len(seen) < self._spec.sightings_min or fits.mean() >= self._spec.slip_share:
+            return False, seen, fits
+        self.state.disturb(self._slip_noise())
+        fits = self.state.squared_distances(seen) <= self._threshold
+        if fits.sum() >= self._spec.sightings_min:
+            seen = relinearised(self.state, seen, seen.take(fits), self._spec.slip_rounds)
             fits = self.state.squared_distances(seen) <= self._threshold
-        return bool(slipped), fits
+        return True, seen, fits
 
     def _taken_in(self, seen: Innovations, fits: Bools) -> tuple[Bools, float]:
         """Correct the state by the sightings that fit together; gives which, and their NIS."""
@@ -192,8 +210,8 @@ class SlamRun:
         return accepted, nis
 
     def _slip_noise(self) -> Array:
-        """Give the noise of a step that is believed to within its own length only."""
-        spec, sizes = self._spec, np.linalg.norm(self._twist.reshape(2, 3), axis=1)
+        """Give the noise of the steps since the last fix, believed to within their length only."""
+        spec, sizes = self._spec, np.linalg.norm(self._unfixed.reshape(2, 3), axis=1)
         least = spec.slip_sigma_m, spec.slip_sigma_rad
         return np.diag(np.repeat(np.maximum(sizes, least), 3))
 
@@ -226,16 +244,17 @@ class SlamRun:
             self._log[name].append(float(value))
 
 
-def _step(
-    odometry: OdometryStream | None, k: int, poses: list[SE3], spec: SlamSpec
-) -> tuple[Array, Array]:
-    """Give the motion to an image and what unit noises do to it."""
+def _step(odometry: OdometryStream | None, k: int, poses: list[SE3], spec: SlamSpec) -> Step:
+    """Give the motion to an image and what is unsure of it."""
+    lasting = np.zeros((LASTING, 6))
     if odometry is not None:
         twist = odometry.twist[k]
-        return twist, np.vstack(
-            [np.diag(np.sqrt(odometry.variance[k])), odometry.scale_sigma[k] * twist]
-        )
+        seconds = (odometry.t_ns[k] - odometry.t_ns[k - 1]) / NS_PER_S if k else 0.0
+        lasting[:3, 3:] = seconds * np.eye(3)
+        lasting[3] = odometry.scale_sigma[k] * twist
+        return Step(twist, np.diag(np.sqrt(odometry.variance[k])), lasting)
     if k == 0:
-        return np.zeros(6), np.zeros((0, 6))
+        return Step(np.zeros(6), np.zeros((0, 6)), lasting)
     held = (poses[-2].inverse() @ poses[-1]).log() if k > 1 else np.zeros(6)
-    return held, np.diag(np.repeat([spec.free_sigma_m, spec.free_sigma_rad], 3))
+    noise = np.diag(np.repeat([spec.free_sigma_m, spec.free_sigma_rad], 3))
+    return Step(held, noise, lasting)

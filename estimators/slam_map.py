@@ -9,8 +9,10 @@ from lpet_sim.recording.arrays import Array, Ints
 
 POSE = 6
 """Rows of the state before the slots, and of a keyframe: position and rotation."""
-FREE, KEYFRAME = -1, -2
-"""What stands in place of a landmark's id in a slot that is free or holds a keyframe."""
+FREE, KEYFRAME, ODOMETRY = -1, -2, -3
+"""What stands in place of a landmark's id in a slot that is free, or of a keyframe or odometry."""
+LASTING = 4
+"""Lasting errors of odometry, in the first two slots: its rate of turn and its scale."""
 
 
 class LandmarkMap:
@@ -48,6 +50,7 @@ class LandmarkMap:
         )
         self.host: Ints = np.arange(capacity)
         self.keyframes: list[int] = []
+        self.id[:2] = ODOMETRY
         self.pinned: NDArray[np.bool_] = np.zeros(capacity, dtype=bool)
 
     def __len__(self) -> int:

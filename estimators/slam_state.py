@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from estimators import gaussian, gaussian_blocks, slam_gate, slam_kernels
 from estimators.jacobians import hat, se3_exp
 from estimators.observation import camera_vector, transfer
 from estimators.slam_kernels import FIRST_ESTIMATES, RELATIVE, RIGHT_INVARIANT, STANDARD
-from estimators.slam_map import FREE, POSE, LandmarkMap
+from estimators.slam_map import FREE, LASTING, POSE, LandmarkMap
 from estimators.slam_spec import SlamSpec
+from estimators.slam_values import Innovations, Step
 from lpet_sim.geometry import SE3
+from lpet_sim.geometry.so3 import left_jacobian
 from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.recording.calibration import StereoCalibration
 
@@ -23,41 +22,10 @@ FORMS = {
     ("right_invariant", "world"): RIGHT_INVARIANT,
     ("right_invariant", "keyframe"): RELATIVE,
 }
+Mean = tuple[Array, Array, Array, Array, Array, Array]
 _START_VARIANCE = 1e-12
 _GROWTH = 1.25
 _POSE_ROWS = np.arange(POSE)
-
-
-@dataclass
-class Innovations:
-    """Sightings of known landmarks against their prediction.
-
-    Attributes:
-        slots: Which landmarks, Shape (m,).
-        rows: First row in the state of each landmark and of its keyframe, -1 if it has none.
-        r: Seen minus predicted [px], Shape (m, 3).
-        H: Derivatives by the pose's error; by the keyframe's it is -H, Shape (m, 3, 6).
-        G: Derivatives by the landmark's own, Shape (m, 3, 3).
-        variance: Of each image coordinate [px^2], Shape (m,).
-    """
-
-    slots: Ints
-    rows: tuple[Ints, Ints]
-    r: Array
-    H: Array
-    G: Array
-    variance: Array
-
-    def __len__(self) -> int:
-        return len(self.slots)
-
-    def take(self, which: NDArray[np.bool_]) -> Innovations:
-        """Keep some of them."""
-        if which.all():
-            return self
-        rows = self.rows[0][which], self.rows[1][which]
-        values = (a[which] for a in (self.r, self.H, self.G, self.variance))
-        return Innovations(self.slots[which], rows, *values)
 
 
 class SlamState:
@@ -66,11 +34,18 @@ class SlamState:
     Attributes:
         R: Rotation of the body in the world, Shape (3, 3).
         p: Position of the body, from where the run starts [m], Shape (3,).
-        P: Covariance of (pose, landmarks), Shape (6 + 3 c, 6 + 3 c); see `slam_kernels`.
+        lasting: Lasting errors of odometry: rate of turn [rad/s] and scale [sigma], Shape (4,).
+        P: Covariance of (pose, slots), Shape (6 + 3 c, 6 + 3 c); see `slam_kernels`.
         landmarks: The map.
     """
 
-    def __init__(self, T_world_body: SE3, calibration: StereoCalibration, spec: SlamSpec) -> None:
+    def __init__(
+        self,
+        T_world_body: SE3,
+        calibration: StereoCalibration,
+        spec: SlamSpec,
+        rate_sigma_radps: float = 0.0,
+    ) -> None:
         self._calibration, self._spec = calibration, spec
         self._camera = camera_vector(calibration)
         T_body_camera = calibration.T_body_camera.se3()
@@ -81,7 +56,10 @@ class SlamState:
         self.R, self.p = np.array(T_world_body.rotation), np.zeros(3)
         self._predicted = self.R, self.p
         self.landmarks = LandmarkMap()
-        start = gaussian.independent(np.full(POSE, _START_VARIANCE))
+        self.lasting = np.zeros(LASTING)
+        rate = spec.noise_scale * max(rate_sigma_radps, 1e-12)
+        sure = np.r_[np.full(POSE, _START_VARIANCE), np.full(3, rate**2), spec.noise_scale**2]
+        start = gaussian.independent(sure)
         self.P = gaussian_blocks.enlarged(start, self.landmarks.rows)
 
     @property
@@ -104,13 +82,9 @@ class SlamState:
             M[:3, 3:] = -self.R.T @ hat(self.p)
         return gaussian.transport(self.P[:POSE, :POSE], M)
 
-    def advance(self, twist: Array, noise: Array) -> None:
-        """Move by an increment of odometry.
-
-        Args:
-            twist: ``log(T_prev_curr)``, Shape (6,).
-            noise: What unit noises do to its right perturbation, Shape (k, 6).
-        """
+    def advance(self, step: Step) -> None:
+        """Move by an increment of odometry, less what is known of its lasting errors."""
+        twist = step.twist + self.lasting @ step.lasting
         R_step, p_step = se3_exp(np.ascontiguousarray(twist))
         before = self._predicted[1] if self._form == FIRST_ESTIMATES else self.p
         self.p = self.p + self.R @ p_step
@@ -120,7 +94,8 @@ class SlamState:
             F[:3, 3:] = -hat(self.p - before)
             gaussian_blocks.move_block(self.P, F, np.zeros((POSE, POSE)))
         self._predicted = self.R, self.p
-        self.disturb(noise)
+        gaussian_blocks.carry(self.P, self._directions(step.lasting), POSE)
+        self.disturb(step.noise)
 
     def disturb(self, noise: Array) -> None:
         """Add noise to the right perturbation of the pose.
@@ -128,15 +103,19 @@ class SlamState:
         Args:
             noise: What unit noises do to it, Shape (k, 6).
         """
-        B_T = np.zeros((len(noise), self.landmarks.rows))
-        turn = np.ascontiguousarray(noise[:, 3:] @ self.R.T)
-        B_T[:, :3], B_T[:, 3:POSE] = noise[:, :3] @ self.R.T, turn
+        gaussian_blocks.add_noise(self.P, self._directions(noise))
+
+    def _directions(self, moves: Array) -> Array:
+        """Give what right perturbations of the pose, Shape (k, 6), are in the state, (k, n)."""
+        B_T = np.zeros((len(moves), self.landmarks.rows))
+        turn = np.ascontiguousarray(moves[:, 3:] @ self.R.T)
+        B_T[:, :3], B_T[:, 3:POSE] = moves[:, :3] @ self.R.T, turn
         if self._invariant:
             B_T[:, :3] += np.cross(self.p, turn)
         if self._form == RIGHT_INVARIANT:
             m = self.landmarks
             slam_kernels.turning_noise(self._camera, m.hosts[:2], m.numbers, m.alive, turn, B_T)
-        gaussian_blocks.add_noise(self.P, B_T)
+        return B_T
 
     def innovations(self, slots: Ints, stereo_px: Array, variance: Array) -> Innovations:
         """Predict the sightings of known landmarks and compare them with what was seen."""
@@ -147,7 +126,9 @@ class SlamState:
         slam_kernels.linearise(
             self._camera, pose, arm, m.hosts, m.numbers, slots, self._form, predicted, H, G
         )
-        return Innovations(slots, self._rows(slots), stereo_px - predicted, H, G, variance)
+        return Innovations(
+            slots, self._rows(slots), stereo_px, stereo_px - predicted, H, G, variance
+        )
 
     def _rows(self, slots: Ints) -> tuple[Ints, Ints]:
         hosts = self.landmarks.host[slots]
@@ -168,6 +149,17 @@ class SlamState:
         slam_gate.innovation_covariance(HP, seen.rows, seen.H, seen.G, seen.variance, S)
         return HP, S
 
+    def mean(self) -> Mean:
+        """Give a copy of the estimate without its covariance."""
+        m = self.landmarks
+        hosts = m.R_world_host.copy(), m.p_world_host.copy()
+        return self.R, self.p, self.lasting, m.x.copy(), *hosts
+
+    def restore(self, mean: Mean) -> None:
+        """Put an estimate back that `mean` gave, for the same slots."""
+        m = self.landmarks
+        self.R, self.p, self.lasting, m.x[:], m.R_world_host[:], m.p_world_host[:] = mean
+
     def correct(self, r: Array, HP: Array, S: Array) -> float:
         """Take sightings in and give their normalised innovation squared.
 
@@ -177,20 +169,38 @@ class SlamState:
             S: Likewise.
         """
         dx, nis = gaussian_blocks.update_in_place(self.P, HP, S, r.ravel())
+        self.retract(dx)
+        return nis
+
+    def retract(self, dx: Array) -> None:
+        """Move the estimate by a correction, Shape (n,)."""
         turn, shift = se3_exp(np.ascontiguousarray(dx[:POSE]))
         m = self.landmarks
-        m.x += dx[POSE:].reshape(-1, 3) * m.alive[:, None]
+        self.lasting = self.lasting + dx[POSE : POSE + LASTING]
+        m.x += self._moves(dx) * m.alive[:, None]
         self.R = turn @ self.R
         if not self._invariant:
             self.p = self.p + dx[:3]
-            return nis
+            return
         self.p = turn @ self.p + shift
         if self._form == RIGHT_INVARIANT:
             m.R_world_host = turn @ m.R_world_host
             m.p_world_host = m.p_world_host @ turn.T
         else:
             self._move_keyframes(dx)
-        return nis
+
+    def _moves(self, dx: Array) -> Array:
+        """Give what a correction adds to the numbers of each slot, Shape (c, 3).
+
+        A place near by moves by ``J(phi) rho`` of the group beside the turn of its host, which is
+        ``R_h' J(-phi) R_h e`` in the turned host.
+        """
+        e, m = dx[POSE:].reshape(-1, 3), self.landmarks
+        if self._form != RIGHT_INVARIANT:
+            return e
+        J = left_jacobian(-dx[3:POSE])
+        moved = np.einsum("cki,kl,clj,cj->ci", m.R_world_host, J, m.R_world_host, e, optimize=True)
+        return np.where(m.far[:, None] > 0, e, moved)
 
     def _move_keyframes(self, dx: Array) -> None:
         m = self.landmarks

@@ -1,0 +1,39 @@
+"""Linearising sightings where they lead, for steps that odometry got wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from estimators import gaussian
+from estimators.slam_state import SlamState
+from estimators.slam_values import Innovations
+
+
+def relinearised(
+    state: SlamState, known: Innovations, believed: Innovations, rounds: int
+) -> Innovations:
+    """Give the innovations of known landmarks with derivatives at the pose they lead to.
+
+    ``dx_i+1 = K_i (z - h(x_i) + H_i dx_i)``, an iterated filter: the innovations that come back
+    belong to the estimate as it is, which is not changed.
+
+    Args:
+        state: The filter's.
+        known: All sightings of landmarks in the map.
+        believed: Those of them that lead the way.
+        rounds: Iterations.
+
+    Reference:
+        Bell and Cathey (1993), The iterated Kalman filter update as a Gauss-Newton method
+        [recalled].
+    """
+    start, dx = state.mean(), None
+    for _ in range(rounds):
+        HP, S = state.joint(believed)
+        dx = HP.T @ gaussian.cholesky_solve(S, believed.r.reshape(-1, 1))[:, 0]
+        state.retract(dx)
+        believed = state.innovations(believed.slots, believed.z, believed.variance)
+        believed = replace(believed, r=believed.r + believed.moved_by(dx))
+        there = state.innovations(known.slots, known.z, known.variance)
+        state.restore(start)
+    return known if dx is None else replace(there, r=there.r + there.moved_by(dx))

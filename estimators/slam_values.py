@@ -1,0 +1,69 @@
+"""What goes into the SLAM filter at each image: a step of odometry, and innovations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lpet_sim.recording.arrays import Array, Ints
+
+
+@dataclass
+class Innovations:
+    """Sightings of known landmarks against their prediction.
+
+    Attributes:
+        slots: Which landmarks, Shape (m,).
+        rows: First row in the state of each landmark and of its keyframe, -1 if it has none.
+        z: The sightings [px], Shape (m, 3).
+        r: Seen minus predicted [px], Shape (m, 3).
+        H: Derivatives by the pose's error; by the keyframe's it is -H, Shape (m, 3, 6).
+        G: Derivatives by the landmark's own, Shape (m, 3, 3).
+        variance: Of each image coordinate [px^2], Shape (m,).
+    """
+
+    slots: Ints
+    rows: tuple[Ints, Ints]
+    z: Array
+    r: Array
+    H: Array
+    G: Array
+    variance: Array
+
+    def __len__(self) -> int:
+        return len(self.slots)
+
+    def take(self, which: NDArray[np.bool_]) -> Innovations:
+        """Keep some of them."""
+        if which.all():
+            return self
+        rows = self.rows[0][which], self.rows[1][which]
+        values = (a[which] for a in (self.z, self.r, self.H, self.G, self.variance))
+        return Innovations(self.slots[which], rows, *values)
+
+    def moved_by(self, dx: Array) -> Array:
+        """Give how a correction of the state changes the predictions, to first order, (m, 3)."""
+        block = np.arange(6)
+        landmarks = dx[self.rows[0][:, None] + block[:3]]
+        hosted = (self.rows[1] >= 0)[:, None]
+        pose = dx[:6] - np.where(hosted, dx[self.rows[1][:, None] + block], 0.0)
+        moves = np.einsum("mij,mj->mi", self.H, pose) + np.einsum("mij,mj->mi", self.G, landmarks)
+        return np.asarray(moves)
+
+
+@dataclass(frozen=True)
+class Step:
+    """The motion to an image by odometry, and what is unsure of its right perturbation.
+
+    Attributes:
+        twist: ``log(T_prev_curr)``, Shape (6,).
+        noise: What unit noises do, Shape (k, 6).
+        lasting: What the lasting errors do: turning at 1 rad/s about x, y, z, and scale, by one
+            standard deviation, Shape (4, 6).
+    """
+
+    twist: Array
+    noise: Array
+    lasting: Array
