@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve
 
 from lpet_sim.errors import RecordingError
+from lpet_sim.evaluation.odometry_model import OdometryStep, lasting_errors, odometry_steps
 from lpet_sim.evaluation.sighting_model import (
     OUTLIER_CHI2,
     Landmarks,
@@ -39,7 +40,6 @@ from lpet_sim.recording.streams import OdometryStream, SightingStream
 START_VARIANCE = 1e-12
 """Variance of the start pose, which is given: a micrometre and a microradian."""
 
-_ANYWHERE = np.repeat([1e4, 10.0], 3)
 _POSE = 6
 
 
@@ -71,10 +71,11 @@ def end_bound(
     calibration: StereoCalibration,
     odometry: OdometryStream | None = None,
     p_world_of: Mapping[int, ArrayLike] | None = None,
+    rate_sigma_radps: float = 0.0,
 ) -> PoseBound:
     """Give the bound of the body's pose at the last image; see `pose_bounds`."""
-    last = len(sightings) - 1
-    return pose_bounds(truth_poses, sightings, calibration, odometry, p_world_of, [last])[0]
+    last, told = len(sightings) - 1, (sightings, calibration, odometry, p_world_of)
+    return pose_bounds(truth_poses, *told, [last], rate_sigma_radps)[0]
 
 
 def pose_bounds(
@@ -84,6 +85,7 @@ def pose_bounds(
     odometry: OdometryStream | None = None,
     p_world_of: Mapping[int, ArrayLike] | None = None,
     at: Sequence[int] | Ints | None = None,
+    rate_sigma_radps: float = 0.0,
 ) -> list[PoseBound]:
     """Give the bounds of the body's pose at some images, each from what is measured up to it.
 
@@ -99,6 +101,8 @@ def pose_bounds(
         p_world_of: True places of the landmarks by their names [m], each Shape (3,); None: they are
             triangulated at the true poses.
         at: The images, in increasing order; None: all but the first.
+        rate_sigma_radps: Declared constant error of the odometry's rate of turn about each axis,
+            1 sigma: the bias of the gyro that it was made with.
 
     Returns:
         A bound for each of the images.
@@ -113,9 +117,10 @@ def pose_bounds(
     _, by_landmark, by_camera = in_view(rows, T_world_camera, landmarks, calibration)
     by_body = by_camera @ calibration.T_body_camera.se3().inverse().adjoint()
     sigma = rows.sigma_px[:, None, None]
-    known = _Information(rows, by_landmark / sigma, by_body / sigma, _has_scale(odometry))
+    lasting = lasting_errors(truth_poses, odometry, rate_sigma_radps)
+    known = _Information(rows, by_landmark / sigma, by_body / sigma, lasting.shape[2])
     bounds = {}
-    for image, state in enumerate(known.over_time(_steps(truth_poses, odometry))):
+    for image, state in enumerate(known.over_time(odometry_steps(truth_poses, odometry, lasting))):
         if image in wanted:
             bounds[image] = PoseBound(state.pose_covariance())
         if image == wanted[-1]:
@@ -162,66 +167,32 @@ def _landmarks(
     return landmarks, (residual**2).sum(axis=1)
 
 
-@dataclass(frozen=True)
-class _Step:
-    """How the error of a pose becomes that of the next: ``F xi + u s + noise``.
-
-    Attributes:
-        back: Inverse of the transition of (pose error, scale error), Shape (6 + c, 6 + c).
-        variance: Variance of the noise, Shape (6,).
-    """
-
-    back: Array
-    variance: Array
-
-
-def _has_scale(odometry: OdometryStream | None) -> bool:
-    return odometry is not None and bool(np.any(odometry.scale_sigma[:1] > 0))
-
-
-def _steps(truth_poses: SE3, odometry: OdometryStream | None) -> Iterator[_Step]:
-    """Give the steps between the images.
-
-    ``T_next = T T_prev_curr``, so ``xi_next = Ad(T_prev_curr^-1) xi + d + diag(scale_sigma) u s``
-    with one relative error s of unit variance for all parts and steps.
-    """
-    T_prev_curr = truth_poses[:-1].inverse() @ truth_poses[1:]
-    twist = T_prev_curr.log()
-    forward = T_prev_curr.adjoint()  # The inverse of Ad(T_prev_curr^-1).
-    for k in range(len(twist)):
-        back = np.eye(_POSE + _has_scale(odometry))
-        back[:_POSE, :_POSE] = forward[k]
-        if odometry is not None and _has_scale(odometry):
-            back[:_POSE, _POSE] = -forward[k] @ (odometry.scale_sigma[k + 1] * twist[k])
-        yield _Step(back, _ANYWHERE if odometry is None else odometry.variance[k + 1])
-
-
 class _Information:
-    """The information of the newest pose, the odometry's scale and the landmarks still in use.
+    """The information of the newest pose, odometry's lasting errors and landmarks still in use.
 
     The matrix is kept dense with room for landmarks to come; a landmark has a slot of three rows
     from its first sighting to its last.
     """
 
-    def __init__(self, rows: Rows, G: Array, J: Array, has_scale: bool) -> None:
+    def __init__(self, rows: Rows, G: Array, J: Array, lasting: int) -> None:
         """Start with the known pose and no landmark.
 
         Args:
             rows: Sightings in order of the images, m.
             G: Their derivatives by the landmark over their noise, Shape (m, 3, 3).
             J: Their derivatives by the pose of the body over their noise, Shape (m, 3, 6).
-            has_scale: Whether the odometry has a scale error.
+            lasting: Number of the odometry's lasting errors.
         """
         self._rows, self._G, self._J = rows, G, J
-        self._head = _POSE + has_scale
-        self._matrix = np.diag(np.repeat([1.0 / START_VARIANCE, 1.0], [_POSE, has_scale]))
+        self._head = _POSE + lasting
+        self._matrix = np.diag(np.repeat([1.0 / START_VARIANCE, 1.0], [_POSE, lasting]))
         self._slot = np.full(len(rows.landmark_id), -1)
         last = np.zeros(len(rows.landmark_id), dtype=np.int64)
         np.maximum.at(last, rows.landmark, rows.image)
         self._last = last
         self._held = np.zeros(0, dtype=np.int64)
 
-    def over_time(self, steps: Iterator[_Step]) -> Iterator[_Information]:
+    def over_time(self, steps: Iterator[OdometryStep]) -> Iterator[_Information]:
         """Yield itself after each image's sightings."""
         self._sight(0)
         yield self
@@ -237,7 +208,7 @@ class _Information:
         block = cho_solve(factor, np.eye(len(self._matrix), _POSE))[:_POSE]
         return np.asarray(0.5 * (block + block.T))
 
-    def _move(self, step: _Step) -> None:
+    def _move(self, step: OdometryStep) -> None:
         """Replace the pose by the next one.
 
         With the transition A and noise Q of the pose alone: ``M = A^-T Y A^-1``, ``D = I + Q

@@ -145,7 +145,14 @@ def bound_of(scene: Scene | str) -> dict[str, Any]:
         return none | {"bound_text": "there are no sightings of a declared stereo camera"}
     try:
         at_images = scene.truth.trajectory.at(told.sightings.t_ns)
-        bound = end_bound(at_images, told.sightings, told.calibration.stereo, told.odometry)
+        imu = told.calibration.imu
+        bound = end_bound(
+            at_images,
+            told.sightings,
+            told.calibration.stereo,
+            told.odometry,
+            rate_sigma_radps=0.0 if imu is None else imu.gyro_bias_radps,
+        )
     except Exception as error:
         _log.debug("no bound", exc_info=True)
         return none | {"bound_text": said(error)}
