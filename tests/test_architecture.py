@@ -40,7 +40,7 @@ BREAKS: list[tuple[Rule, str, str]] = [
     (rules.covariance_breaks, "estimators/x.py", "self.covariance -= K @ H"),
 ]
 RULES = list(dict.fromkeys(rule for rule, _, _ in BREAKS))
-HEAVY = ("mujoco", "ompl", "cv2", "rerun", "trimesh", "rasterio")
+HEAVY = ("mujoco", "ompl", "cv2", "rerun", "trimesh", "rasterio", "gtsam", "distributed")
 
 
 @pytest.fixture(scope="module")
