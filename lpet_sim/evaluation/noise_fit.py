@@ -12,7 +12,7 @@ standard error says.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -20,6 +20,13 @@ from scipy.special import gammaln
 from scipy.stats import chi2
 
 from lpet_sim.errors import RecordingError
+from lpet_sim.evaluation.noise_model import (
+    TAILS_MAX,
+    NoiseFit,
+    corrected,
+    predicted_points,
+    shared_design,
+)
 from lpet_sim.evaluation.sighting_tracks import CameraPath, Tracks
 from lpet_sim.evaluation.track_kernels import Flags, fit_points
 from lpet_sim.evaluation.variance_kernels import sum_tracks
@@ -27,93 +34,14 @@ from lpet_sim.geometry import SE3, so3
 from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.calibration import StereoCalibration
 
-SHARED: Final = ("disparity_bias_px", "focal_scale_error", "baseline_scale_error")
-"""Shared errors that a sensor's spec can hold; the camera's mounting follows as a rotation."""
 _SHARED_PRIOR: Final = np.array([5.0, 0.2, 0.2, 0.2, 0.2, 0.2])
 _START_PX: Final = 1.0
 _ROUNDS: Final = 15
 _STILL: Final = 1e-3
-_SETTLING_ROUNDS: Final = 15
-_STILL: Final = 1e-3
+_SETTLING_ROUNDS: Final = 10
 _VARIANCE_MIN_PX2: Final = 1e-10
 _TRACKS_MIN: Final = 10
-_LONG: Final = 4
-_TAILS: Final = np.geomspace(1.0, 200.0, 80)
-TAILS_MAX: Final = float(_TAILS[-1])
-"""Degrees of freedom from which on Student's t is called Gaussian."""
-
-
-@dataclass(frozen=True, eq=False)
-class NoiseFit:
-    """What is left of sightings at the best points of their landmarks.
-
-    Attributes:
-        variance_px2: Squared scales of the white noise of u_left, u_right, v under Student's t, and
-            the variance of the fixed error of each coordinate of a landmark, Shape (4,).
-        variance_se_px2: Standard errors of these, Shape (4,).
-        tails: Degrees of freedom of Student's t; `TAILS_MAX` is Gaussian.
-        shared: Disparity bias [px], declared over true focal length less 1, the same of the
-            baseline, rotation of the camera against its declared mounting [rad], Shape (6,).
-        shared_se: Standard errors of these, tracks taken as independent, Shape (6,).
-        point_px: Each landmark as (u_left, v, disparity) in the image of its track's middle row,
-            Shape (k, 3).
-        residual_px: Measured less predicted coordinates [px], Shape (m, 3).
-        H: Derivatives of the coordinates by the landmark's point, Shape (m, 3, 3).
-        fixed_px: Likeliest fixed error of each landmark [px], Shape (k, 3).
-        left_px: What point and fixed error leave of the residuals [px], Shape (m, 3).
-        taken: Share of the variance of each that both took up, Shape (m, 3).
-        fits: Which sightings can be of their track's landmark by chi-square, Shape (m,).
-        path: The camera's path at which this holds.
-    """
-
-    variance_px2: Array
-    variance_se_px2: Array
-    tails: float
-    shared: Array
-    shared_se: Array
-    point_px: Array
-    residual_px: Array
-    H: Array
-    fixed_px: Array
-    left_px: Array
-    taken: Array
-    fits: Flags
-    path: CameraPath
-
-    @property
-    def sigma_px(self) -> Array:
-        """Noise of u_left, u_right, v and the fixed error, 1 sigma [px], Shape (4,).
-
-        The white noise is the Gaussian one that limits an estimator as much: Student's t of scale s
-        in p = 3 dimensions holds the information ``(n + p) / (n + p + 2) / s^2`` on its centre.
-
-        Reference:
-            Lange, Little, Taylor, Robust statistical modeling using the t distribution (1989),
-            appendix B.
-        """
-        factor = (self.tails + 5.0) / (self.tails + 3.0)
-        return np.sqrt(self.variance_px2 * np.array([factor, factor, factor, 1.0]))
-
-    @property
-    def sigma_se_px(self) -> Array:
-        """Standard errors of `sigma_px` by the delta rule, Shape (4,)."""
-        return np.asarray(self.variance_se_px2 / (2.0 * np.maximum(self.sigma_px, 1e-3)))
-
-    @property
-    def weight(self) -> Array:
-        """Weight of each sighting under Student's t, 0 where it does not fit, Shape (m,)."""
-        # What point and fixed error took up is not seen in what they leave, but it is there.
-        far = (self.left_px**2 / self.variance_px2[:3] + np.minimum(self.taken, 1.0)).sum(axis=1)
-        return np.asarray(self.fits * (self.tails + 3.0) / (self.tails + far))
-
-    def studentised_px(self, tracks: Tracks) -> tuple[Array, Flags]:
-        """Give residuals as large as the noise that made them [px], (m, 3), and which can be used.
-
-        Used are sightings of landmarks that are seen often enough for their residuals to tell.
-        """
-        use = self.fits & (tracks.total(self.fits) >= _LONG)[tracks.track]
-        share = np.maximum(1.0 - self.taken, 0.1)
-        return np.asarray(self.left_px / np.sqrt(share)), np.asarray(use)
+_TAILS: Final = np.geomspace(1.0, TAILS_MAX, 80)
 
 
 def fit_noise(
@@ -169,18 +97,9 @@ def _blank(tracks: Tracks, path: CameraPath) -> NoiseFit:
     nothing, points, rows = np.zeros(6), np.zeros((len(tracks), 3)), np.zeros((m, 3))
     H, fits = np.zeros((m, 3, 3)), np.zeros(m, dtype=bool)
     shared = TAILS_MAX, nothing, nothing
-    return NoiseFit(start, start, *shared, points, rows, H, points, rows, rows, fits, path)
-
-
-def corrected(
-    shared: Array, calibration: StereoCalibration, path: CameraPath
-) -> tuple[Array, CameraPath]:
-    """Give the camera (f, b, cx, cy), Shape (4,), and its path with shared errors taken out."""
-    focal_px = calibration.focal_px / (1.0 + shared[1])
-    baseline_m = calibration.baseline_m / (1.0 + shared[2])
-    camera = np.array([focal_px, baseline_m, calibration.cx_px, calibration.cy_px])
-    turn = SE3(so3.exp(shared[3:]), np.zeros(3))
-    return camera, CameraPath.from_se3(turn @ path.T_camera_world)
+    squares = np.full(len(tracks), 3 * _VARIANCE_MIN_PX2)
+    per_track = points, squares
+    return NoiseFit(start, start, *shared, points, rows, H, *per_track, rows, rows, fits, path)
 
 
 def _pointed(
@@ -226,9 +145,9 @@ def _refined(fit: NoiseFit, tracks: Tracks, stereo: StereoCalibration, shared: b
     F, quadratic = np.zeros((4, 4)), np.zeros(4)
     sums = np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6))
     fixed, left = np.zeros_like(fit.point_px), np.zeros_like(fit.left_px)
-    weight, taken = fit.weight, np.zeros_like(left)
-    used = fit.residual_px, fit.H, X, weight, fit.variance_px2
-    sum_tracks(tracks.starts, *used, F, quadratic, sums, (fixed, left, taken))
+    weight, taken, squares = fit.weight, np.zeros_like(left), np.zeros_like(fit.fixed_px2)
+    used = fit.residual_px, fit.H, X, weight, _width(fit), fit.variance_px2
+    sum_tracks(tracks.starts, *used, F, quadratic, sums, (fixed, left, taken, squares))
     variance = solve_variances(F, quadratic)
     spread = np.sqrt(2.0 * np.diag(np.linalg.pinv(F)))
     fit = replace(
@@ -236,6 +155,7 @@ def _refined(fit: NoiseFit, tracks: Tracks, stereo: StereoCalibration, shared: b
         variance_px2=variance,
         variance_se_px2=spread,
         fixed_px=fixed,
+        fixed_px2=squares,
         left_px=left,
         taken=taken,
     )
@@ -263,6 +183,12 @@ def fit_tails(fit: NoiseFit, tracks: Tracks) -> float:
     return float(_TAILS[int(np.argmax(likelihood))])
 
 
+def _width(fit: NoiseFit) -> Array:
+    """Give the factors that Student's t puts on the fixed errors, whose tails are taken alike."""
+    far = fit.fixed_px2 / fit.variance_px2[3]
+    return np.asarray(np.sqrt((fit.tails + far) / (fit.tails + 3.0)))
+
+
 def solve_variances(F: Array, quadratic: Array) -> Array:
     """Solve ``F theta = quadratic`` with every variance kept positive, Shape (4,).
 
@@ -274,36 +200,9 @@ def solve_variances(F: Array, quadratic: Array) -> Array:
     return np.maximum(theta, _VARIANCE_MIN_PX2)
 
 
-def shared_design(fit: NoiseFit, tracks: Tracks, stereo: StereoCalibration) -> Array:
-    """Give the derivatives of the residuals by the shared errors, Shape (m, 3, 6).
-
-    A disparity bias lowers u_right; a declared focal length or baseline above the true one makes
-    the prediction too wide; the mounting turns points in the camera, ``dp = phi x p``.
-    """
-    true, predicted, p = _predicted(fit, tracks, stereo)
-    centre = np.array([stereo.cx_px, stereo.cx_px, stereo.cy_px])
-    X = np.zeros((len(p), 3, 6))
-    X[:, 1, 0] = -1.0
-    X[:, :, 1] = -(predicted - centre)
-    X[:, 1, 2] = predicted[:, 0] - predicted[:, 1]
-    X[:, :, 3:] = -true.projection_jacobian(p) @ so3.hat(p)
-    return X
-
-
-def _predicted(
-    fit: NoiseFit, tracks: Tracks, stereo: StereoCalibration
-) -> tuple[StereoCalibration, Array, Array]:
-    """Give the true pair, predicted coordinates [px] and points in the camera [m], (m, 3) each."""
-    camera, _ = corrected(fit.shared, stereo, fit.path)
-    true = stereo.model_copy(update={"focal_px": camera[0], "baseline_m": camera[1]})
-    predicted = tracks.stereo_px + np.array([0.0, fit.shared[0], 0.0]) - fit.residual_px
-    predicted[:, 1] = np.minimum(predicted[:, 1], predicted[:, 0] - 1e-3)
-    return true, predicted, true.triangulate(predicted)
-
-
 def _settled(fit: NoiseFit, tracks: Tracks, stereo: StereoCalibration) -> NoiseFit:
     """Move each image's pose onto the landmarks it sees, one Gauss-Newton step."""
-    true, _, p = _predicted(fit, tracks, stereo)
+    true, _, p = predicted_points(fit, tracks, stereo)
     J = true.projection_jacobian(p)
     J = np.concatenate([J, -J @ so3.hat(p)], axis=2)
     use = fit.fits & (tracks.lengths > 1)[tracks.track]

@@ -6,23 +6,22 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi
 
-from lpet_sim.evaluation.noise_fit import NoiseFit, fit_noise
+from lpet_sim.evaluation.equivalent_noise import equivalent_sigma_px
+from lpet_sim.evaluation.noise_fit import fit_noise
+from lpet_sim.evaluation.noise_model import NoiseFit
 from lpet_sim.evaluation.sighting_tracks import CameraPath, Tracks
-from lpet_sim.evaluation.track_kernels import Flags
 from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.calibration import StereoCalibration
 from lpet_sim.recording.streams import SightingStream
 from lpet_sim.recording.trajectory import Trajectory
 
 LAGS: Final = 10
+FAR_M: Final = 60.0
+"""From here on landmarks are on far relief, as in the landmark sensor."""
 RANGE_SHARES: Final = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
-ESTIMATOR_DOF: Final = 6.0
-"""Degrees of freedom of the Student's t by which the two-view estimator weighs."""
-ESTIMATOR_GATE: Final = 16.27
-"""Chi-square at which estimators refuse a sighting: 99.9 % of three Gaussian coordinates."""
 _LONG_TRACK: Final = 15
+_STEPPED: Final = 8
 _BINS: Final = 6
 
 
@@ -33,6 +32,8 @@ class NoiseFigures:
     Attributes:
         sigma_px: White noise of u_left, u_right and v of a Gaussian sensor on which an estimator
             that trusts the declared noise would do as well, 1 sigma [px], Shape (3,).
+        step_px: The same of what differs between consecutive images alone, Shape (3,): what is left
+            of it changes slowly, and is more like a fixed error.
         rms_px: Root mean square of the noise of sightings that fit, Shape (3,).
         core_px: Noise by Student's t (`NoiseFit.sigma_px`) with its standard error, Shape (3, 2).
         tails: Degrees of freedom of that t.
@@ -46,6 +47,7 @@ class NoiseFigures:
     """
 
     sigma_px: Array
+    step_px: Array
     rms_px: Array
     core_px: Array
     tails: float
@@ -74,6 +76,8 @@ class TrackFigures:
             landmark's place.
         length: Mean number of sightings of a landmark.
         range_m: Quantiles `RANGE_SHARES` of the distance of landmarks from the left eye [m].
+        range_near_m: Range that 99 % of those nearer than `FAR_M` do not exceed [m].
+        far: Share of sightings that are further than `FAR_M`.
         border_px: Distance from the images' edge that 99.5 % of the sightings keep [px].
     """
 
@@ -87,6 +91,8 @@ class TrackFigures:
     lost: float
     length: float
     range_m: Array
+    range_near_m: float
+    far: float
     border_px: float
 
 
@@ -102,6 +108,7 @@ class SensorFit:
         shared_se: Their standard errors, Shape (6,).
         settled: Whether each image's common motion was taken out of the noise.
         residual_px: Noise of each sighting that can tell [px], Shape (m, 3), for histograms.
+        p_world: Places of the landmarks in order of their ids [m], Shape (k, 3).
     """
 
     noise: NoiseFigures
@@ -110,6 +117,7 @@ class SensorFit:
     shared_se: Array
     settled: bool
     residual_px: Array
+    p_world: Array
 
 
 def fit_sensor(
@@ -136,47 +144,18 @@ def fit_sensor(
     px, use = fit.studentised_px(tracks)
     noise = _noise_figures(fit, tracks, calibration)
     shown = _track_figures(fit, tracks, sightings, calibration)
-    return SensorFit(noise, shown, fit.shared, fit.shared_se, settle, px[use])
-
-
-def equivalent_sigma_px(px: Array, declared_px: Array) -> Array:
-    """Give the Gaussian noise that would hurt an estimator as much as this one, Shape (3,).
-
-    An estimator that weighs by declared noise s and Student's t of n degrees of freedom, and gates,
-    is an M-estimator with ``psi(r) = r / s^2 (n + 3) / (n + |r|^2 / s^2)``; the variance of its
-    result is that of least squares with noise of variance ``E[psi^2] / E[psi']^2`` (Huber 1964),
-    here over the same for a Gaussian.
-
-    Args:
-        px: Noise of sightings [px], Shape (m, 3).
-        declared_px: What is declared of each, 1 sigma [px], Shape (m,).
-    """
-    rho = np.linspace(1e-3, 12.0, 4000)
-    density = chi.pdf(rho, 3)
-    _, weight, slope = _influence(rho**2)
-    gauss = np.trapezoid(rho**2 * weight**2 * density, rho) / 3.0
-    gauss /= np.trapezoid((weight + rho**2 / 3.0 * slope) * density, rho) ** 2
-    far = np.sum(px**2, axis=1) / declared_px**2
-    _, weight, slope = _influence(far)
-    s2 = declared_px[:, None] ** 2
-    psi2 = np.mean((px / s2 * weight[:, None]) ** 2, axis=0)
-    gain = np.mean((weight[:, None] + px**2 / s2 * slope[:, None]) / s2, axis=0)
-    return np.asarray(np.sqrt(psi2 / np.maximum(gain, 1e-12) ** 2 / gauss))
-
-
-def _influence(far: Array) -> tuple[Flags, Array, Array]:
-    """Give who passes the gate, the weights, and twice their slope by the squared distance."""
-    inside = far < ESTIMATOR_GATE
-    weight = inside * (ESTIMATOR_DOF + 3.0) / (ESTIMATOR_DOF + far)
-    return inside, weight, -2.0 * weight / (ESTIMATOR_DOF + far)
+    _, p_world = places(fit, tracks, calibration)
+    return SensorFit(noise, shown, fit.shared, fit.shared_se, settle, px[use], p_world)
 
 
 def _noise_figures(fit: NoiseFit, tracks: Tracks, calibration: StereoCalibration) -> NoiseFigures:
     px, use = fit.studentised_px(tracks)
+    step_px = _step_sigma_px(fit, tracks)
     px, declared = px[use], tracks.sigma_px[use]
     rms = np.sqrt(np.mean(px**2, axis=0))
     return NoiseFigures(
         sigma_px=equivalent_sigma_px(px, declared),
+        step_px=step_px,
         rms_px=rms,
         core_px=np.column_stack([fit.sigma_px[:3], fit.sigma_se_px[:3]]),
         tails=fit.tails,
@@ -187,6 +166,18 @@ def _noise_figures(fit: NoiseFit, tracks: Tracks, calibration: StereoCalibration
         lag_correlation=lag_correlation(fit, tracks),
         by_range=_noise_by_range(px, _ranges_m(fit, tracks, calibration)[use]),
     )
+
+
+def _step_sigma_px(fit: NoiseFit, tracks: Tracks) -> Array:
+    """Measure the noise by differences between consecutive images of long tracks, Shape (3,)."""
+    px, _ = fit.studentised_px(tracks)
+    track, use = tracks.track, fit.fits & (tracks.total(fit.fits) >= _STEPPED)[tracks.track]
+    pair = use[1:] & use[:-1] & (track[1:] == track[:-1]) & (np.diff(tracks.image) == 1)
+    if not np.any(pair):
+        return np.full(3, np.nan)
+    sigma2 = tracks.sigma_px**2
+    both = np.sqrt(sigma2[1:] + sigma2[:-1])[pair]
+    return equivalent_sigma_px((px[1:] - px[:-1])[pair], both) / np.sqrt(2.0)
 
 
 def lag_correlation(fit: NoiseFit, tracks: Tracks) -> Array:
@@ -243,6 +234,8 @@ def _track_figures(
     edge = np.minimum(tracks.stereo_px, _size(calibration) - 1.0 - tracks.stereo_px).min(axis=1)
     border_px = max(float(np.quantile(edge, 0.005)), 0.0)
     seen_next, lost = _seen_next(fit, tracks, calibration, border_px)
+    range_m = _ranges_m(fit, tracks, calibration)[fit.fits]
+    near_m = range_m[range_m < FAR_M]
     return TrackFigures(
         images=len(sightings),
         period_s=float(np.median(np.diff(sightings.t_s))) if len(sightings) > 1 else 0.0,
@@ -253,7 +246,9 @@ def _track_figures(
         seen_between=float(np.sum(tracks.lengths[many] - 2) / inner) if inner > 0 else 1.0,
         lost=lost,
         length=float(tracks.lengths.mean()),
-        range_m=np.quantile(_ranges_m(fit, tracks, calibration)[fit.fits], RANGE_SHARES),
+        range_m=np.quantile(range_m, RANGE_SHARES),
+        range_near_m=float(np.quantile(near_m, 0.99)) if len(near_m) else FAR_M,
+        far=float(np.mean(range_m >= FAR_M)),
         border_px=border_px,
     )
 

@@ -39,6 +39,7 @@ def _rows(fit: SensorFit) -> dict[str, str]:
     shared, error = fit.shared, fit.shared_se
     return {
         "noise of u_left, u_right, v [px]": _triple(noise.sigma_px),
+        "  what differs between consecutive images [px]": _triple(noise.step_px),
         "  root mean square of those that fit [px]": _triple(noise.rms_px),
         "  scale under Student's t [px]": _triple(noise.core_px[:, 0]),
         "  degrees of freedom of that t": f"{noise.tails:.1f}",

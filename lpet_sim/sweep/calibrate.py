@@ -10,7 +10,7 @@ import numpy as np
 
 from lpet_sim.errors import RecordingError
 from lpet_sim.evaluation.figures import save
-from lpet_sim.evaluation.sensor_fit import SensorFit, fit_sensor
+from lpet_sim.evaluation.sensor_fit import FAR_M, SensorFit, fit_sensor
 from lpet_sim.evaluation.sensor_report import plot_sensor
 from lpet_sim.evaluation.sighting_tracks import since
 from lpet_sim.outputs import whole_file
@@ -99,18 +99,21 @@ def sensor_spec(fit: SensorFit) -> LandmarkSensorSpec:
     """Make the landmark sensor of measured figures; how dense landmarks are is left at its default.
 
     A landmark of this sensor is found anew in each image, so the detection probability is how often
-    one in view is seen in the next image: two images then share as many as they did.
+    one in view is seen in the next image: two images then share as many as they did. Its noise has
+    no memory: what changes slowly is added to the fixed error.
     """
-    left, right, v = np.maximum(fit.noise.sigma_px, _SIGMA_MIN_PX)
+    left, right, v = white = np.maximum(white_px(fit), _SIGMA_MIN_PX)
     sure = np.abs(fit.shared[:3]) > _SURE * fit.shared_se[:3]
     disparity, focal, baseline = (float(x) for x in np.where(sure, fit.shared[:3], 0.0))
     tracks, sure_fixed = fit.tracks, fit.noise.fixed_px[0] > _SURE * fit.noise.fixed_px[1]
+    slow_px2 = max(float(np.mean(fit.noise.sigma_px**2 - white**2)), 0.0)
+    fixed_px = fit.noise.fixed_px[0] if sure_fixed else 0.0
     return LandmarkSensorSpec(
         period_s=tracks.period_s,
         visibility=VisibilitySpec(
             border_px=tracks.border_px,
             range_min_m=float(tracks.range_m[0]),
-            range_max_m=float(tracks.range_m[-1]),
+            range_max_m=tracks.range_near_m,
             range_full_m=float(tracks.range_m[0]),
             sightings_max=max(round(float(tracks.sightings.mean() / tracks.seen_next)), 1),
         ),
@@ -118,7 +121,7 @@ def sensor_spec(fit: SensorFit) -> LandmarkSensorSpec:
             sigma_left_px=float(left),
             sigma_right_px=float(right),
             sigma_v_px=float(v),
-            bias_sigma_px=fit.noise.fixed_px[0] if sure_fixed else 0.0,
+            bias_sigma_px=float(np.hypot(fixed_px, np.sqrt(slow_px2))),
             declared_sigma_px=fit.noise.declared_px,
         ),
         detection_probability=tracks.seen_next,
@@ -127,6 +130,12 @@ def sensor_spec(fit: SensorFit) -> LandmarkSensorSpec:
         focal_scale_error=focal,
         baseline_scale_error=baseline,
     )
+
+
+def white_px(fit: SensorFit) -> Array:
+    """Give the part of the noise that is new in each image, 1 sigma [px], Shape (3,)."""
+    step_px = np.where(np.isfinite(fit.noise.step_px), fit.noise.step_px, fit.noise.sigma_px)
+    return np.asarray(np.minimum(step_px, fit.noise.sigma_px))
 
 
 def _with_density(
@@ -139,17 +148,18 @@ def _with_density(
     """
     range_m, images = _probe(spec, recording, seed)
     wanted = float(fit.tracks.sightings.mean()) / fit.tracks.seen_next * images
+    near_m, wanted_near = range_m[range_m < FAR_M], wanted * (1.0 - fit.tracks.far)
 
     def shown(full_m: float) -> float:
-        return float(np.sum(np.minimum(1.0, full_m / range_m) ** spec.visibility.range_exponent))
+        return float(np.sum(np.minimum(1.0, full_m / near_m) ** spec.visibility.range_exponent))
 
     most = _DENSITY_MAX_PER_M2 / _PROBE_PER_M2
     steps = np.geomspace(spec.visibility.range_min_m, spec.visibility.range_max_m, 60)
-    full_m = next((x for x in steps if shown(x) * most >= wanted), steps[-1])
-    factor = min(wanted / max(shown(full_m), 1.0), most)
-    field = _probe_field().model_copy(
-        update={"ground_per_m2": _PROBE_PER_M2 * factor, "per_rock": _PROBE_PER_M2 * factor}
-    )
+    full_m = next((x for x in steps if shown(x) * most >= wanted_near), steps[-1])
+    density = _PROBE_PER_M2 * min(wanted_near / max(shown(full_m), 1.0), most)
+    far_per_rad = _probe_field().far_per_rad
+    far_per_rad *= wanted * fit.tracks.far / max(len(range_m) - len(near_m), 1)
+    field = LandmarkFieldSpec(ground_per_m2=density, per_rock=density, far_per_rad=far_per_rad)
     visibility = spec.visibility.model_copy(update={"range_full_m": float(full_m)})
     return spec.model_copy(update={"field": field, "visibility": visibility})
 
