@@ -28,8 +28,8 @@ class Policy(Protocol):
         Args:
             landmarks: The map after the image.
             entering: How many are about to enter.
-            surprise: Predicted variance of the sighting of each slot, Shape (c,), where the
-                policy asks for it.
+            surprise: Summed variance of the image coordinates of each slot in its host camera
+                [px^2], Shape (c,), where the policy asks for it.
         """
         ...
 
@@ -108,11 +108,16 @@ def build_policy(spec: KeepAll | TimeToLive | BoundedQueue) -> Policy:
     return WaitingPool(spec) if isinstance(spec, BoundedQueue) else Everything()
 
 
-def choose_anchors(landmarks: LandmarkMap, spec: AnchorSpec) -> Ints:
-    """Give the slots of the landmarks that become anchors when the rover sets off."""
+def choose_anchors(landmarks: LandmarkMap, disparity: Array, spec: AnchorSpec) -> Ints:
+    """Give the slots of the landmarks that become anchors when the rover sets off.
+
+    Args:
+        landmarks: The map at standstill.
+        disparity: Of each slot as its host camera sees it [px], Shape (c,).
+        spec: How many, and which.
+    """
     known = np.flatnonzero((landmarks.alive > 0) & (landmarks.looks >= spec.looks_min))
-    disparity = landmarks.x[known, 0] - landmarks.x[known, 1]
-    order = np.argsort(disparity if spec.prefer == "far" else -disparity, kind="stable")
+    order = np.argsort((1.0 if spec.prefer == "far" else -1.0) * disparity[known], kind="stable")
     return known[order[: spec.count_max]]
 
 

@@ -135,7 +135,8 @@ class SlamRun:
                 moved[0] <= anchors.standstill_m and moved[1] <= anchors.standstill_rad
             )
             if not self._standing:
-                self.landmarks.pinned[choose_anchors(self.landmarks, anchors)] = True
+                chosen = choose_anchors(self.landmarks, self.state.in_hosts()[0], anchors)
+                self.landmarks.pinned[chosen] = True
 
     def see(self, landmark_id: Ints, stereo_px: Array, sigma_px: Array) -> None:
         """Take in the sightings of one image pair."""
@@ -234,10 +235,11 @@ class SlamRun:
     def _leaving(self, entering: int) -> Ints:
         retention, variance = self._spec.retention, None
         if isinstance(retention, BoundedQueue) and retention.leave == "least_confidence":
-            variance = self.state.landmark_variance()
-        if self._spec.anchors is not None:
-            self.state.leave(expired_anchors(self.landmarks, self._spec.anchors))
-        return self._policy.leaving(self.landmarks, entering, variance)
+            variance = self.state.in_hosts()[1]
+        gone = self._policy.leaving(self.landmarks, entering, variance)
+        if self._spec.anchors is None:
+            return gone
+        return np.concatenate([expired_anchors(self.landmarks, self._spec.anchors), gone])
 
     def _note(self, **values: float) -> None:
         for name, value in values.items():

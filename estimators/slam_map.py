@@ -129,6 +129,12 @@ class LandmarkMap:
         self.R_world_host[slot], self.p_world_host[slot] = camera
         self.keyframes.append(slot)
 
+    def is_near(self, slot: int, camera: tuple[Array, Array], reach: tuple[float, float]) -> bool:
+        """Tell whether a keyframe is within a distance [m] and an angle [rad] of a camera."""
+        away = np.linalg.norm(self.p_world_host[slot] - camera[1])
+        cosine = 0.5 * (np.trace(self.R_world_host[slot].T @ camera[0]) - 1.0)
+        return bool(away < reach[0] and cosine > np.cos(reach[1]))
+
     def idle_keyframes(self) -> list[int]:
         """Give the slots of keyframes that host no landmark, the latest one left out."""
         hosts = set(self.host[self.alive > 0].tolist())

@@ -53,6 +53,7 @@ class SlamState:
         self._p_body_camera = np.array(T_body_camera.translation)
         self._origin = np.array(T_world_body.translation)
         self._form = FORMS[spec.formulation, spec.landmark_frame]
+        self._reach = spec.keyframe_m, spec.keyframe_rad
         self.R, self.p = np.array(T_world_body.rotation), np.zeros(3)
         self._predicted = self.R, self.p
         self.landmarks = LandmarkMap()
@@ -126,9 +127,8 @@ class SlamState:
         slam_kernels.linearise(
             self._camera, pose, arm, m.hosts, m.numbers, slots, self._form, predicted, H, G
         )
-        return Innovations(
-            slots, self._rows(slots), stereo_px, stereo_px - predicted, H, G, variance
-        )
+        r = stereo_px - predicted
+        return Innovations(slots, self._rows(slots), stereo_px, r, H, G, variance)
 
     def _rows(self, slots: Ints) -> tuple[Ints, Ints]:
         hosts = self.landmarks.host[slots]
@@ -259,7 +259,7 @@ class SlamState:
     def _keyframe(self, now: tuple[Array, Array]) -> int:
         """Give the latest keyframe, or make one of the camera's pose if that is too far away."""
         m = self.landmarks
-        if m.keyframes and self._near(m.keyframes[-1], now):
+        if m.keyframes and m.is_near(m.keyframes[-1], now, self._reach):
             return m.keyframes[-1]
         if m.free_pair() < 0:
             self._room(m.capacity - int((m.id != FREE).sum()) + 2)
@@ -271,12 +271,6 @@ class SlamState:
             m.drop_keyframe(idle)
         return slot
 
-    def _near(self, slot: int, now: tuple[Array, Array]) -> bool:
-        m = self.landmarks
-        away = np.linalg.norm(m.p_world_host[slot] - now[1])
-        cosine = 0.5 * (np.trace(m.R_world_host[slot].T @ now[0]) - 1.0)
-        return bool(away < self._spec.keyframe_m and cosine > np.cos(self._spec.keyframe_rad))
-
     def leave(self, slots: Ints) -> None:
         """Take landmarks out of the state."""
         for slot in slots:
@@ -287,9 +281,12 @@ class SlamState:
         """Drop the correlations between landmarks, and those with the pose unless they are kept."""
         gaussian_blocks.drop_correlations(self.P, POSE, keep_pose)
 
-    def landmark_variance(self) -> Array:
-        """Give the summed variance of the three numbers of each slot [px^2], Shape (c,)."""
-        return np.diag(self.P)[POSE:].reshape(-1, 3).sum(axis=1)
+    def in_hosts(self) -> tuple[Array, Array]:
+        """Give disparity [px] and summed variance [px^2] of landmarks in their hosts, (c,)."""
+        m = self.landmarks
+        out = np.empty((2, m.capacity))
+        slam_kernels.in_hosts(self._camera, m.numbers, m.alive, self.P, out)
+        return out[0], out[1]
 
     def _camera_pose(self, R: Array, p: Array) -> tuple[Array, Array]:
         return np.ascontiguousarray(R @ self._R_body_camera), p + R @ self._p_body_camera
