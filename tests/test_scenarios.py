@@ -98,6 +98,19 @@ def test_real_data_are_scored_and_drawn(tmp_path: Path) -> None:
     assert picture.stat().st_size > 10_000
 
 
+def test_the_error_on_real_images_is_predicted(tmp_path: Path) -> None:
+    """Noise alone predicts far too little; with the camera's errors as measured it comes out."""
+    printed = run_quick("kitti_prediction.py", tmp_path, "--out", str(tmp_path / "kitti"))
+    if "skipped" in printed:
+        pytest.skip(printed)
+    table, _ = written_by(printed)
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    obtained, noise = float(rows[0]["end_percent"]), float(rows[1]["end_percent"])
+    whole = float(next(r for r in rows if "its mounting" in r["sightings"])["end_percent"])
+    assert noise < 0.1 * obtained
+    assert 0.75 < whole / obtained < 1.33
+
+
 def test_the_experiments_fill_their_tables(tmp_path: Path) -> None:
     """Two short drives give a row for each seed, arm and estimator."""
     printed = run_quick("experiments.py", tmp_path, "--out", str(tmp_path), "--workers", "1")
