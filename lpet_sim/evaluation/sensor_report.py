@@ -105,7 +105,7 @@ def _draw_noise(axes: Axes, fit: SensorFit, sensed: SensorFit | None, k: int) ->
     x = np.linspace(-limit, limit, 400)
     axes.plot(x, np.exp(-0.5 * (x / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi)), "k", lw=1)
     axes.set_yscale("log")
-    axes.set_ylim(bottom=1e-3)
+    axes.set_ylim(1e-3, 3.0 / sigma)
 
 
 def _draw_counts(axes: Axes, fit: SensorFit, sensed: SensorFit | None) -> None:
