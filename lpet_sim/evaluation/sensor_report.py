@@ -14,6 +14,7 @@ from lpet_sim.recording.arrays import Array
 _NAMES = ("u_left", "u_right", "v")
 _COLOURS = ("#D55E00", "#0072B2", "#009E73")
 _WIDE = 5.0
+_RANGE_TICKS_M = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
 
 
 def sensor_tables(fit: SensorFit, sensed: SensorFit | None = None) -> list[Table]:
@@ -122,4 +123,8 @@ def _draw_ranges(axes: Axes, fit: SensorFit, sensed: SensorFit | None) -> None:
     if sensed is not None:
         axes.plot(sensed.tracks.range_m, RANGE_SHARES, "o-", color="grey", label="landmark sensor")
     axes.set(xlabel="range [m]", ylabel="share of sightings nearer", xscale="log")
+    ends = fit.tracks.range_m[[0, -1]]
+    ticks = [tick for tick in _RANGE_TICKS_M if ends[0] / 2 <= tick <= 2 * ends[1]]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.set_xticks([], minor=True)
     axes.legend()
