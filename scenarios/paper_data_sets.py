@@ -1,31 +1,45 @@
 """The data sets of the paper's experiment: at least 30 m of ExoMars terrain, each with slips.
 
-    python -m scenarios.paper_data_sets [--count 100] [--out out/paper] [--workers 2]
+    python -m scenarios.paper_data_sets [--quick] [--count 100] [--out out/paper] [--workers 2]
 
 Drives the traverses in physics, without images, and keeps each in ``out/paper/traverses`` as it
-ends; one that is there is not driven again.
+ends; one that is there is not driven again. A drive that gets stuck before it has covered 30 m is
+listed, and a further seed takes its place.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import asdict, dataclass
+from itertools import count
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from rich.progress import track
 
-from lpet_sim.outputs import output_folder
+from lpet_sim.errors import LpetError
+from lpet_sim.evaluation.errors import distance_driven_m
+from lpet_sim.outputs import output_folder, whole_file
 from lpet_sim.planning.clearance import RouteSpec
+from lpet_sim.progress import Progress, silent
+from lpet_sim.recording.arrays import NS_PER_S
+from lpet_sim.recording.reader import read_recording
+from lpet_sim.recording.truth import Event, Truth
 from lpet_sim.rng import stream
 from lpet_sim.rover.spec import DriveSpec, ForcedSlip, Stop
 from lpet_sim.sweep.simulate import simulate
 from lpet_sim.sweep.traverse import TraverseSpec
+from lpet_sim.terminal import bar, say
 
 OUT = Path("out/paper")
 LENGTH_M = 30.2
+MIN_PATH_M = 30.0
+QUICK_LENGTH_M, QUICK_MIN_PATH_M, QUICK_COUNT = 3.0, 2.5, 4
+QUICK_FIRST = 2
+"""The way around the rocks of seed 1 is four times as long as straight ahead."""
 STANDSTILL_S = 36.0
 """Fifty images at 0.72 s, in which an observable filter maps its anchors."""
 
@@ -80,30 +94,126 @@ def traverse_file(folder: Path, seed: int) -> Path:
     return folder / "traverses" / f"paper{seed:03d}.rrd"
 
 
-def drive_data_set(folder: Path, seed: int) -> str:
+@dataclass(frozen=True)
+class DrivenSet:
+    """What became of the drive of one data set.
+
+    Attributes:
+        seed: Its seed.
+        path_m: Distance truly driven [m].
+        ended: Kind of the event that ended the drive.
+        slip_at_m: Distance driven when the long forced slip began [m]; NaN if it never did.
+    """
+
+    seed: int
+    path_m: float
+    ended: str
+    slip_at_m: float = math.nan
+
+
+def drive_data_set(folder: Path, seed: int, length_m: float = LENGTH_M) -> DrivenSet:
     """Drive one data set unless it is there, and say how it ended."""
     path = traverse_file(folder, seed)
-    if path.exists():
-        return "there"
-    result = simulate(paper_traverse(seed), seed, path)
-    return next((event.kind for event in result.events if event.ends), "arrived")
+    if not path.exists():
+        try:
+            simulate(paper_traverse(seed, length_m), seed, path)
+        except LpetError as error:
+            return DrivenSet(seed, 0.0, f"not driven: {error}")
+    return look_over(path, seed)
+
+
+def look_over(path: Path, seed: int) -> DrivenSet:
+    """Read how far a drive came; kept beside the recording, which takes a while to read."""
+    kept = path.with_suffix(".json")
+    if not kept.exists() or kept.stat().st_mtime < path.stat().st_mtime:
+        truth = read_recording(path).truth
+        assert truth is not None
+        with whole_file(kept) as temporary:
+            temporary.write_text(json.dumps(asdict(_driven(truth, seed))))
+    return DrivenSet(**json.loads(kept.read_text()))
+
+
+def _driven(truth: Truth, seed: int) -> DrivenSet:
+    so_far_m = distance_driven_m(truth.trajectory)
+    ended = "" if truth.ending is None else truth.ending.kind
+    slip = max(
+        (event for event in truth.events if event.kind == "forced_slip"),
+        key=lambda event: event.duration_s,
+        default=None,
+    )
+    at_m = math.nan if slip is None else float(np.interp(*_when(slip, truth), so_far_m))
+    return DrivenSet(seed, float(so_far_m[-1]), ended, at_m)
+
+
+def _when(event: Event, truth: Truth) -> tuple[float, np.ndarray]:
+    return event.t_ns / NS_PER_S, truth.body.t_ns / NS_PER_S
+
+
+def driven_sets(folder: Path) -> list[DrivenSet]:
+    """Look over all data sets that are there, by seed."""
+    found = sorted((folder / "traverses").glob("paper*.rrd"))
+    return [look_over(path, int(path.stem.removeprefix("paper"))) for path in found]
+
+
+def drive_until(
+    folder: Path,
+    wanted: int,
+    workers: int,
+    length_m: float = LENGTH_M,
+    min_path_m: float = MIN_PATH_M,
+    first: int = 1,
+    progress: Progress = silent,
+) -> list[DrivenSet]:
+    """Drive data sets from the first seed on until so many are long enough; those there are kept.
+
+    For each that falls short one more seed is driven, so that the seeds do not depend on the order
+    in which drives end.
+
+    Args:
+        folder: Where they go.
+        wanted: How many data sets are to be long enough.
+        workers: How many are driven at once.
+        length_m: Length of the planned path [m].
+        min_path_m: Shorter paths do not count [m].
+        first: The first seed.
+        progress: Told the share of those wanted that are there.
+
+    Returns:
+        All that were driven, by seed, those that fell short too.
+    """
+    seeds, driven = count(first), list[DrivenSet]()
+    output_folder(folder / "traverses")
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+
+        def begin() -> Future[DrivenSet]:
+            return pool.submit(drive_data_set, folder, next(seeds), length_m)
+
+        under_way = {begin() for _ in range(wanted)}
+        while under_way:
+            ended, under_way = wait(under_way, return_when=FIRST_COMPLETED)
+            driven += (new := [future.result() for future in ended])
+            under_way |= {begin() for drive in new if drive.path_m < min_path_m}
+            progress(1.0 - len(under_way) / wanted)
+    return sorted(driven, key=lambda drive: drive.seed)
 
 
 def main() -> None:
-    """Drive the data sets over the workers."""
+    """Drive the data sets over the workers, and list those that fell short."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=OUT)
-    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--count", type=int, default=100, help="so many that cover 30 m")
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--quick", action="store_true", help="four of 3 m")
     options = parser.parse_args()
-    output_folder(options.out / "traverses")
-    with ProcessPoolExecutor(options.workers, mp_context=get_context("spawn")) as pool:
-        done = {
-            pool.submit(drive_data_set, options.out, seed): seed
-            for seed in range(1, options.count + 1)
-        }
-        for future in track(as_completed(done), "driving", total=len(done)):
-            print(f"data set {done[future]}: {future.result()}")
+    lengths = (QUICK_LENGTH_M, QUICK_MIN_PATH_M) if options.quick else (LENGTH_M, MIN_PATH_M)
+    wanted = min(options.count, QUICK_COUNT) if options.quick else options.count
+    first = QUICK_FIRST if options.quick else 1
+    with bar("driving") as progress:
+        driven = drive_until(options.out, wanted, options.workers, *lengths, first, progress)
+    for drive in driven:
+        short = f"; left out: shorter than {lengths[1]:g} m" if drive.path_m < lengths[1] else ""
+        say(f"data set {drive.seed}: {drive.path_m:.1f} m, {drive.ended}{short}")
+    say(f"wrote {options.out / 'traverses'}")
 
 
 if __name__ == "__main__":

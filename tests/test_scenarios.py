@@ -163,6 +163,20 @@ def test_a_hundred_metres_begin_and_every_estimator_has_its_line(tmp_path: Path)
     assert not pose["SLAM M = 10, told half the noise"].startswith("**")
 
 
+def test_the_papers_experiment_runs_on_data_sets_driven_for_it(tmp_path: Path) -> None:
+    """Two short drives give tables and pictures; multiframe is far better than odometry."""
+    few = ("--count", "2", "--workers", "1")
+    driven = run_quick("paper_data_sets.py", tmp_path, *few, "--out", str(tmp_path / "sets"))
+    assert re.findall(r"data set (\d): .* m, goal$", driven, re.MULTILINE) == ["2", "3"]
+    where = ("--data-sets", str(tmp_path / "sets"), "--work", str(tmp_path / "work"))
+    written = written_by(run_quick("paper_experiment.py", tmp_path, *few, *where))
+    assert sum(path.suffix == ".png" for path in written) == 6
+    with next(path for path in written if path.name == "paper_variants.csv").open() as file:
+        rows = {row["variant"]: row for row in csv.DictReader(file)}
+    best = float(rows["m10-n9999-coupled-observable-standard"]["worst median [%]"])
+    assert best < 0.1 * float(rows["odometry"]["worst median [%]"])
+
+
 @pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.stem)
 def test_a_scenario_file_is_a_traverse(path: Path) -> None:
     """It loads, is called what its file is called, and goes to YAML and back unchanged."""
