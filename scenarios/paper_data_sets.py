@@ -118,19 +118,24 @@ def drive_data_set(folder: Path, seed: int, length_m: float = LENGTH_M) -> Drive
         try:
             simulate(paper_traverse(seed, length_m), seed, path)
         except LpetError as error:
-            return DrivenSet(seed, 0.0, f"not driven: {error}")
+            return _keep(path, DrivenSet(seed, 0.0, f"not driven: {error}"))
     return look_over(path, seed)
 
 
 def look_over(path: Path, seed: int) -> DrivenSet:
     """Read how far a drive came; kept beside the recording, which takes a while to read."""
     kept = path.with_suffix(".json")
-    if not kept.exists() or kept.stat().st_mtime < path.stat().st_mtime:
+    if path.exists() and (not kept.exists() or kept.stat().st_mtime < path.stat().st_mtime):
         truth = read_recording(path).truth
         assert truth is not None
-        with whole_file(kept) as temporary:
-            temporary.write_text(json.dumps(asdict(_driven(truth, seed))))
+        return _keep(path, _driven(truth, seed))
     return DrivenSet(**json.loads(kept.read_text()))
+
+
+def _keep(path: Path, driven: DrivenSet) -> DrivenSet:
+    with whole_file(path.with_suffix(".json")) as temporary:
+        temporary.write_text(json.dumps(asdict(driven)))
+    return driven
 
 
 def _driven(truth: Truth, seed: int) -> DrivenSet:
@@ -150,9 +155,10 @@ def _when(event: Event, truth: Truth) -> tuple[float, np.ndarray]:
 
 
 def driven_sets(folder: Path) -> list[DrivenSet]:
-    """Look over all data sets that are there, by seed."""
-    found = sorted((folder / "traverses").glob("paper*.rrd"))
-    return [look_over(path, int(path.stem.removeprefix("paper"))) for path in found]
+    """Look over all data sets that were driven, or could not be, by seed."""
+    found = {path.stem for path in (folder / "traverses").glob("paper*.*")}
+    seeds = sorted(int(stem.removeprefix("paper")) for stem in found)
+    return [look_over(traverse_file(folder, seed), seed) for seed in seeds]
 
 
 def drive_until(

@@ -111,7 +111,9 @@ def said_on_top(rows: Rows, driven: Sequence[DrivenSet], setting: Setting) -> li
     seeds = {int(float(seed)) for seed in rows["seed"]}
     used = [drive for drive in driven if drive.seed in seeds]
     short = [d for d in driven if d.path_m < setting.min_path_m and d.seed <= max(seeds)]
-    left = ", ".join(f"{d.seed} ({d.path_m:.1f} m, {d.ended})" for d in short) or "none"
+    left = (
+        ", ".join(f"{d.seed} ({d.path_m:.1f} m, {d.ended.split(':')[0]})" for d in short) or "none"
+    )
     lengths = [drive.path_m for drive in used]
     stuck = sum(drive.ended != "goal" for drive in used)
     return [
