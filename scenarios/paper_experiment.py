@@ -1,7 +1,7 @@
 """The paper's experiment: a hundred data sets of ExoMars terrain, every variant of the filter.
 
     python -m scenarios.paper_experiment [--quick] [--out docs/results] [--pictures docs/pictures]
-        [--workers 2] [--data-sets DIR] [--work out/paper] [--count 100] [--only PART] [--report]
+        [--workers 2] [--data-sets DIR] [--work out/paper] [--count 100] [--only PART ...] [--report]
 
 Drives the data sets (or takes those in DIR/traverses), runs the sweeps, and writes the tables
 ``paper_*.md`` and ``.csv`` and the pictures. Each run is kept as it ends, so a killed experiment
@@ -160,7 +160,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--data-sets", type=Path, help="a folder with traverses that are driven")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--count", type=int, help="only the first so many data sets")
-    parser.add_argument("--only", choices=[part.name for part in parts()])
+    parser.add_argument("--only", nargs="+", choices=[part.name for part in parts()])
     parser.add_argument("--report", action="store_true", help="of what is there; runs nothing")
     parser.add_argument("--quick", action="store_true", help="four data sets of 3 m")
     return parser.parse_args()
@@ -181,7 +181,7 @@ def main() -> None:
         raise LpetError(f"no data set in {home / 'traverses'} covers {setting.min_path_m:g} m")
     rows: list[Row] = []
     for part in setting.parts:
-        if options.only not in (None, part.name):
+        if options.only and part.name not in options.only:
             continue
         sweep, folder = part.sweep(paths, setting.min_path_m, setting.start_m), work / part.name
         if options.report:

@@ -170,7 +170,7 @@ def test_the_papers_experiment_runs_on_data_sets_driven_for_it(tmp_path: Path) -
     assert re.findall(r"data set (\d): .* m, goal$", driven, re.MULTILINE) == ["2", "3"]
     where = ("--data-sets", str(tmp_path / "sets"), "--work", str(tmp_path / "work"))
     written = written_by(run_quick("paper_experiment.py", tmp_path, *few, *where))
-    assert sum(path.suffix == ".png" for path in written) == 6
+    assert sum(path.suffix == ".png" for path in written) == 7
     with next(path for path in written if path.name == "paper_variants.csv").open() as file:
         rows = {row["variant"]: row for row in csv.DictReader(file)}
     best = float(rows["m10-n9999-coupled-observable-standard"]["worst median [%]"])

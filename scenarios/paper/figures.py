@@ -59,17 +59,18 @@ def _comparable(rows: Rows) -> Rows:
 
 def _of_rows(rows: Rows, folder: Path) -> list[Path]:
     drawn: dict[str, Callable[[], Figure]] = {
-        "paper_growth.png": lambda: _growth(rows),
+        "paper_growth.png": lambda: _growth(rows, "m10-n9999"),
+        "paper_growth_bounded.png": lambda: _growth(rows, "m9999-n40-fifo"),
         "paper_error_over_memory.png": lambda: charts.plot_error_over_memory(rows),
         "paper_error_over_size.png": lambda: charts.plot_error_over_size(rows),
     }
     return [path for name, draw in drawn.items() if (path := _write(draw, folder / name))]
 
 
-def _growth(rows: Rows) -> Figure:
-    """Draw the growth of the three kinds at M = 10, in centimetres as the errors are small."""
-    labels = [f"m10-n9999-{kind}-standard" for kind in
-              ("decoupled-unobservable", "coupled-unobservable", "coupled-observable")]  # fmt: skip
+def _growth(rows: Rows, memory: str) -> Figure:
+    """Draw the growth of the three kinds of one memory, in centimetres as the errors are small."""
+    kinds = ("decoupled-unobservable", "coupled-unobservable", "coupled-observable")
+    labels = [f"{memory}-{kind}-standard" for kind in kinds]
     there = [label for label in labels if label in rows.values("variant")]
     figure = charts.plot_error_growth(rows.with_columns(**{CURVE: 100 * rows[CURVE]}), there)
     figure.axes[0].set_ylabel("position error [cm]")
