@@ -1,7 +1,8 @@
 """The paper's experiment: a hundred data sets of ExoMars terrain, every variant of the filter.
 
     python -m scenarios.paper_experiment [--quick] [--out docs/results] [--pictures docs/pictures]
-        [--workers 2] [--data-sets DIR] [--work out/paper] [--count 100] [--only PART ...] [--report]
+        [--workers 2] [--data-sets DIR] [--work out/paper] [--count 100] [--only PART ...]
+        [--report]
 
 Drives the data sets (or takes those in DIR/traverses), runs the sweeps, and writes the tables
 ``paper_*.md`` and ``.csv`` and the pictures. Each run is kept as it ends, so a killed experiment

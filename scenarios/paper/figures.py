@@ -72,6 +72,8 @@ def _growth(rows: Rows, memory: str) -> Figure:
     kinds = ("decoupled-unobservable", "coupled-unobservable", "coupled-observable")
     labels = [f"{memory}-{kind}-standard" for kind in kinds]
     there = [label for label in labels if label in rows.values("variant")]
+    if not there:
+        raise RowsError(f"no variant has the memory {memory}: there is no growth to draw")
     figure = charts.plot_error_growth(rows.with_columns(**{CURVE: 100 * rows[CURVE]}), there)
     figure.axes[0].set_ylabel("position error [cm]")
     return figure
