@@ -185,7 +185,7 @@ def update_in_place(P: Array, HP: Array, S: Array, innovation: Array) -> tuple[A
     Args:
         P: Covariance, Shape (n, n), C-contiguous; changed.
         HP: ``H P``, Shape (m, n), C-contiguous; spoiled.
-        S: Covariance of the innovation, Shape (m, m).
+        S: Covariance of the innovation, Shape (m, m), C-contiguous; spoiled.
         innovation: Measured minus predicted, Shape (m,).
 
     Returns:
@@ -197,7 +197,7 @@ def update_in_place(P: Array, HP: Array, S: Array, innovation: Array) -> tuple[A
     Reference:
         Bar-Shalom, Li, Kirubarajan (2001), eq. 5.2.3-17 [recalled].
     """
-    L, failed = lapack.dpotrf(S, lower=1)
+    L, failed = lapack.dpotrf(S.T, lower=1, clean=0, overwrite_a=1)
     if failed:
         raise BrokenFilterError("the covariance of an innovation is not positive definite")
     W_T = blas.dtrsm(1.0, L, HP.T, side=1, lower=1, trans_a=1, overwrite_b=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,7 +38,7 @@ class LandmarkMap:
         pinned: Whether it is an anchor, Shape (c,).
     """
 
-    def __init__(self, capacity: int = 64) -> None:
+    def __init__(self, capacity: int = 8) -> None:
         """Make an empty map with room for some landmarks."""
         self.slot_of: dict[int, int] = {}
         self._entries = 0
@@ -131,9 +133,9 @@ class LandmarkMap:
 
     def is_near(self, slot: int, camera: tuple[Array, Array], reach: tuple[float, float]) -> bool:
         """Tell whether a keyframe is within a distance [m] and an angle [rad] of a camera."""
-        away = np.linalg.norm(self.p_world_host[slot] - camera[1])
-        cosine = 0.5 * (np.trace(self.R_world_host[slot].T @ camera[0]) - 1.0)
-        return bool(away < reach[0] and cosine > np.cos(reach[1]))
+        away = self.p_world_host[slot] - camera[1]
+        cosine = 0.5 * (np.vdot(self.R_world_host[slot], camera[0]) - 1.0)
+        return bool(away @ away < reach[0] ** 2 and cosine > math.cos(reach[1]))
 
     def idle_keyframes(self) -> list[int]:
         """Give the slots of keyframes that host no landmark, the latest one left out."""

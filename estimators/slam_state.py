@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from estimators import gaussian, gaussian_blocks, slam_gate, slam_kernels
@@ -24,7 +26,7 @@ FORMS = {
 }
 Mean = tuple[Array, Array, Array, Array, Array, Array]
 _START_VARIANCE = 1e-12
-_GROWTH = 1.25
+_GROWTH = 8
 _POSE_ROWS = np.arange(POSE)
 
 
@@ -112,7 +114,7 @@ class SlamState:
         turn = np.ascontiguousarray(moves[:, 3:] @ self.R.T)
         B_T[:, :3], B_T[:, 3:POSE] = moves[:, :3] @ self.R.T, turn
         if self._invariant:
-            B_T[:, :3] += np.cross(self.p, turn)
+            B_T[:, :3] -= turn @ hat(self.p)
         if self._form == RIGHT_INVARIANT:
             m = self.landmarks
             slam_kernels.turning_noise(self._camera, m.hosts[:2], m.numbers, m.alive, turn, B_T)
@@ -221,7 +223,7 @@ class SlamState:
         """Give free slots, and make them if there are too few."""
         m = self.landmarks
         if len(m.free_slots(count)) < count:
-            m.grow(max(int(_GROWTH * m.capacity), m.capacity + count))
+            m.grow(m.capacity + max(count - len(m.free_slots(count)), _GROWTH))
             self.P = gaussian_blocks.enlarged(self.P, m.rows)
         return m.free_slots(count)
 
@@ -240,7 +242,7 @@ class SlamState:
             slam_kernels.entry_jacobian(
                 self._camera, m.far[slot], m.x_first[slot], host[0], arm, turns, J
             )
-            by_z *= np.sqrt(variance[i])
+            by_z *= math.sqrt(variance[i])
             gaussian_blocks.join_block(self.P, POSE + 3 * int(slot), _POSE_ROWS, J, by_z)
 
     def _enter_keyframe(self, landmark_id: Ints, stereo_px: Array, variance: Array) -> None:
@@ -248,13 +250,14 @@ class SlamState:
         keyframe = self._keyframe(now)
         host = m.R_world_host[keyframe].copy(), m.p_world_host[keyframe].copy()
         known = np.concatenate([_POSE_ROWS, POSE + 3 * keyframe + _POSE_ROWS])
-        x, H, G = np.empty(3), np.empty((3, POSE)), np.empty((3, 3))
+        x, J, H, G = np.empty(3), np.empty((3, 2 * POSE)), np.empty((3, POSE)), np.empty((3, 3))
         for i, slot in enumerate(self._room(len(landmark_id))):
             slam_kernels.relative_entry(self._camera, now, host, stereo_px[i], x, H, G)
             m.enter(int(slot), int(landmark_id[i]), True, keyframe)
             m.x[slot] = m.x_first[slot] = x
-            noise, J = np.sqrt(variance[i]) * G, np.hstack([-H, H])
-            gaussian_blocks.join_block(self.P, POSE + 3 * int(slot), known, J, noise)
+            J[:, :POSE], J[:, POSE:] = -H, H
+            G *= math.sqrt(variance[i])
+            gaussian_blocks.join_block(self.P, POSE + 3 * int(slot), known, J, G)
 
     def _keyframe(self, now: tuple[Array, Array]) -> int:
         """Give the latest keyframe, or make one of the camera's pose if that is too far away."""
