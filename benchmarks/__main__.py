@@ -14,7 +14,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import camera, landmarks, physics, pipeline, store, vision, wheel_law
+from benchmarks import camera, landmarks, physics, pipeline, slam, store, vision, wheel_law
 from benchmarks.case import Case
 from benchmarks.timing import Row, tell
 from lpet_sim.outputs import output_folder, whole_file
@@ -70,6 +70,8 @@ def run(case: Case) -> list[Row]:
     looked = vision.measure(seen.pairs, calibration)
     tell("landmarks ...")
     strewn = landmarks.measure(case.build().terrain, calibration, case.sensed_m)
+    tell("SLAM, in a process of its own ...")
+    filtered = slam.measure(case.images)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "benchmark.rrd"
         tell("the whole pipeline ...")
@@ -80,7 +82,7 @@ def run(case: Case) -> list[Row]:
     hz = 1.0 / spec.rover.physics_dt_s
     bare = pipeline.BareParts(driven.bare, (seen.bare, looked.bare, stored.bare), hz)
     whole = pipeline.rows(done, bare, simulated_s)
-    return [driven.row, *law, *seen.rows, *looked.rows, *strewn, *stored.rows, *whole]
+    return [driven.row, *law, *seen.rows, *looked.rows, *strewn, *filtered, *stored.rows, *whole]
 
 
 def _machine() -> dict[str, object]:

@@ -26,22 +26,24 @@ class Case:
         pairs: Image pairs that the camera and vision benchmarks use.
         repetitions: How often the short things are done.
         sensed_m: How far the landmark sensor goes.
+        images: Length of the SLAM filter's drives.
     """
 
     length_m: float
     pairs: int
     repetitions: int
     sensed_m: float
+    images: int
 
     @classmethod
     def full(cls) -> Case:
         """Make the case whose numbers count."""
-        return cls(length_m=2.5, pairs=60, repetitions=5, sensed_m=34.0)
+        return cls(length_m=2.5, pairs=60, repetitions=5, sensed_m=34.0, images=1000)
 
     @classmethod
     def quick(cls) -> Case:
         """Make a case that only shows that everything runs."""
-        return cls(length_m=0.6, pairs=12, repetitions=2, sensed_m=1.0)
+        return cls(length_m=0.6, pairs=12, repetitions=2, sensed_m=1.0, images=240)
 
     def traverse(self) -> TraverseSpec:
         """Give the traverse: 100 m/h, a pair of 640 x 480 px every 2 cm, all sensors."""

@@ -133,6 +133,6 @@ def stereo(sigma_px: float) -> StereoCalibration:
         cx_px=511.5,
         cy_px=511.5,
         baseline_m=0.15,
-        T_body_camera=PoseSpec.from_se3(SE3(_OPTICAL, [0.3, 0.075, 1.5])),
+        T_body_camera=PoseSpec.from_se3(SE3(_OPTICAL, np.array([0.3, 0.075, 1.5]))),
         sigma_px=sigma_px,
     )

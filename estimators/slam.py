@@ -246,15 +246,20 @@ class SlamRun:
             self._log[name].append(float(value))
 
 
+def odometry_step(odometry: OdometryStream, k: int) -> Step:
+    """Give the motion to an image by odometry and what is unsure of it."""
+    lasting, twist = np.zeros((LASTING, 6)), odometry.twist[k]
+    seconds = (odometry.t_ns[k] - odometry.t_ns[k - 1]) / NS_PER_S if k else 0.0
+    lasting[:3, 3:] = seconds * np.eye(3)
+    lasting[3] = odometry.scale_sigma[k] * twist
+    return Step(twist, np.diag(np.sqrt(odometry.variance[k])), lasting)
+
+
 def _step(odometry: OdometryStream | None, k: int, poses: list[SE3], spec: SlamSpec) -> Step:
-    """Give the motion to an image and what is unsure of it."""
-    lasting = np.zeros((LASTING, 6))
+    """Give the motion to an image, held to be the last one where there is no odometry."""
     if odometry is not None:
-        twist = odometry.twist[k]
-        seconds = (odometry.t_ns[k] - odometry.t_ns[k - 1]) / NS_PER_S if k else 0.0
-        lasting[:3, 3:] = seconds * np.eye(3)
-        lasting[3] = odometry.scale_sigma[k] * twist
-        return Step(twist, np.diag(np.sqrt(odometry.variance[k])), lasting)
+        return odometry_step(odometry, k)
+    lasting = np.zeros((LASTING, 6))
     if k == 0:
         return Step(np.zeros(6), np.zeros((0, 6)), lasting)
     held = (poses[-2].inverse() @ poses[-1]).log() if k > 1 else np.zeros(6)

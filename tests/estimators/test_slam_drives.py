@@ -12,14 +12,14 @@ from scipy.stats import chi2
 from benchmarks.slam_world import SIGMA, Drive
 from estimators import gaussian, gaussian_blocks
 from estimators.odometry_steps import image_odometry
-from estimators.slam import Slam, SlamRun
+from estimators.slam import Slam, SlamRun, odometry_step
 from estimators.slam_map import LASTING, POSE
 from estimators.slam_spec import BoundedQueue, SlamSpec, TimeToLive
 from estimators.slam_state import SlamState
-from estimators.slam_values import Innovations, Step
+from estimators.slam_values import Innovations
 from lpet_sim.evaluation.consistency import anees
 from lpet_sim.geometry import SE3
-from lpet_sim.recording.arrays import NS_PER_S, Array
+from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.streams import Measurements
 from lpet_sim.rng import stream
@@ -120,12 +120,7 @@ class Driven:
         """Take in each image and give its number."""
         seen, odometry = self._sightings, self._odometry
         for k in range(len(seen)):
-            lasting = np.zeros((LASTING, 6))
-            lasting[:3, 3:] = np.eye(3) * (k and (seen.t_ns[k] - seen.t_ns[k - 1]) / NS_PER_S)
-            lasting[3] = odometry.scale_sigma[k] * odometry.twist[k]
-            self.run.advance(
-                Step(odometry.twist[k], np.diag(np.sqrt(odometry.variance[k])), lasting)
-            )
+            self.run.advance(odometry_step(odometry, k))
             rows = seen.rows(k)
             self.run.see(seen.landmark_id[rows], seen.stereo_px[rows], seen.sigma_px[rows])
             yield k
