@@ -27,9 +27,9 @@ from lpet_sim.sweep.sweep_job import prepare
 from lpet_sim.sweep.sweep_once import Scene
 from lpet_sim.sweep.sweep_spec import ArmSpec
 from scenarios.paper.map_figure import plot_relative_map, watch_map
-from scenarios.paper.variants import N, bounded, multiframe
+from scenarios.paper.variants import ANCHORS, N, bounded, multiframe
 
-OBSERVED: Final = multiframe(10, formulation="standard", anchors={})["spec"]
+OBSERVED: Final = multiframe(10, formulation="standard", anchors=ANCHORS)["spec"]
 UNOBSERVED: Final = bounded(N, formulation="standard")["spec"]
 _KINDS = ("decoupled", "coupled")
 
