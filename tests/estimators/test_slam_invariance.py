@@ -14,6 +14,7 @@ from tests.estimators.slam_worlds import (
     SIGHTINGS,
     STEP,
     Truth,
+    block,
     dense,
     difference,
     error_of,
@@ -98,3 +99,18 @@ def test_errors_are_taken_off_as_they_are_put_on() -> None:
             np.testing.assert_allclose(
                 difference(T, moved(T, xi, invariant), invariant), xi, atol=1e-12
             )
+
+
+def test_right_invariant_corrections_move_places_as_the_group_does() -> None:
+    """``exp(phi) p + J(phi) rho`` for position and places alike, however large the correction."""
+    state = on_its_way("right_invariant")
+    before, turned_by = off_by(state, np.zeros(len(state.P))), np.array([0.5, -0.8, 1.2])
+    dx = spread(state, stream(4, "dx").standard_normal(len(live(state))))
+    dx[3:POSE] = turned_by
+    J, R, m = so3.left_jacobian(turned_by), so3.exp(turned_by), state.landmarks
+    places = {s: R @ p + J @ m.R_world_host[s] @ block(dx, s, 3) for s, p in before.points.items()}
+    state.retract(dx)
+    np.testing.assert_allclose(state.p, R @ before.pose.translation + J @ dx[:3], rtol=1e-9)
+    after = off_by(state, np.zeros(len(state.P)))
+    for slot, place in places.items():
+        np.testing.assert_allclose(after.points[slot], place, rtol=1e-9)
