@@ -164,10 +164,10 @@ def test_a_hundred_metres_begin_and_every_estimator_has_its_line(tmp_path: Path)
 
 
 def test_the_papers_experiment_runs_on_data_sets_driven_for_it(tmp_path: Path) -> None:
-    """Two short drives give tables and pictures; multiframe is far better than odometry."""
-    few = ("--count", "2", "--workers", "1")
+    """A short drive gives tables and pictures; multiframe is far better than odometry."""
+    few = ("--count", "1", "--workers", "1")
     driven = run_quick("paper_data_sets.py", tmp_path, *few, "--out", str(tmp_path / "sets"))
-    assert re.findall(r"data set (\d): .* m, goal$", driven, re.MULTILINE) == ["2", "3"]
+    assert re.findall(r"data set (\d): .* m, goal$", driven, re.MULTILINE) == ["2"]
     where = ("--data-sets", str(tmp_path / "sets"), "--work", str(tmp_path / "work"))
     written = written_by(run_quick("paper_experiment.py", tmp_path, *few, *where))
     assert sum(path.suffix == ".png" for path in written) == 7
