@@ -5,8 +5,10 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 export MUJOCO_GL ?= egl
 export PYOPENGL_PLATFORM ?= $(MUJOCO_GL)
+# The matrices are small: a second thread for each of two workers costs more than it gives.
+export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test check bench experiments lock clean opengl env
+.PHONY: demo test check bench experiments paper lock clean opengl env
 
 env: $(STAMP)
 
@@ -36,6 +38,12 @@ experiments: opengl
 	$(BIN)/python -m scenarios.soil_slopes
 	$(BIN)/python -m scenarios.rough_ground
 	$(BIN)/python -m scenarios.experiments
+	$(BIN)/python -m scenarios.hundred_metres
+	$(BIN)/python -m scenarios.real_data
+	$(BIN)/python -m scenarios.kitti_prediction
+
+paper: $(STAMP) ## the paper's experiment: hours; goes on where it was
+	$(BIN)/python -m scenarios.paper_experiment
 
 lock: ## needs uv
 	uv pip compile --python-version 3.11 --extra dev --no-header --no-emit-index-url --no-annotate --upgrade pyproject.toml -o requirements.lock
