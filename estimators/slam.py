@@ -20,7 +20,7 @@ from estimators.odometry_steps import image_odometry
 from estimators.retention import build_policy, choose_anchors, expired_anchors
 from estimators.slam_iterate import relinearised
 from estimators.slam_map import LASTING, LandmarkMap
-from estimators.slam_spec import BoundedQueue, SlamSpec
+from estimators.slam_spec import AnchorSpec, BoundedQueue, SlamSpec
 from estimators.slam_state import SlamState
 from estimators.slam_values import Innovations, Step
 from lpet_sim.geometry import SE3
@@ -118,7 +118,7 @@ class SlamRun:
         self._policy = build_policy(spec.retention)
         self._threshold = chi_square_threshold(3, spec.gate_probability)
         self._standing = spec.anchors is not None
-        self._driven = SE3.identity()
+        self._rested = self._moved = 0
         self._unfixed = np.zeros(6)
         self._log: dict[str, list[float]] = {name: [] for name in LOGGED}
 
@@ -128,15 +128,20 @@ class SlamRun:
         twist = step.twist
         self._unfixed = self._unfixed + np.abs(twist)
         if self._standing and self._spec.anchors is not None:
-            self._driven = self._driven @ SE3.exp(twist)
-            moved = np.linalg.norm(self._driven.log().reshape(2, 3), axis=1)
-            anchors = self._spec.anchors
-            self._standing = bool(
-                moved[0] <= anchors.standstill_m and moved[1] <= anchors.standstill_rad
-            )
-            if not self._standing:
-                chosen = choose_anchors(self.landmarks, self.state.in_hosts()[0], anchors)
-                self.landmarks.pinned[chosen] = True
+            self._watch_standstill(twist, self._spec.anchors)
+
+    def _watch_standstill(self, twist: Array, anchors: AnchorSpec) -> None:
+        """Choose the anchors when the rover sets off after it has stood for long enough."""
+        size = np.linalg.norm(twist.reshape(2, 3), axis=1)
+        if size[0] <= anchors.standstill_m and size[1] <= anchors.standstill_rad:
+            self._rested += 1
+        elif self._rested >= anchors.looks_min:
+            self._standing = False
+            chosen = choose_anchors(self.landmarks, self.state.in_hosts()[0], anchors)
+            self.landmarks.pinned[chosen] = True
+        else:
+            self._rested, self._moved = 0, self._moved + 1
+            self._standing = self._moved <= anchors.settling_images
 
     def see(self, landmark_id: Ints, stereo_px: Array, sigma_px: Array) -> None:
         """Take in the sightings of one image pair."""

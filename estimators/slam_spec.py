@@ -77,16 +77,19 @@ class AnchorSpec(Spec):
         prefer: Which ones are chosen if there are more: the farthest, which stay in view, or those
             known best by the size of their disparity, the nearest.
         unseen_images_max: An anchor unseen for longer leaves like any other landmark; None: never.
-        standstill_m: The rover stands at the start until odometry says that it is further away [m].
-        standstill_rad: Or that it turned by more [rad].
+        standstill_m: The rover stands while an image's step by odometry is at most this long [m].
+        standstill_rad: And turns it by at most this [rad].
+        settling_images: Images of motion at the start, such as of settling, after which no more
+            standstill is waited for.
     """
 
     count_max: Annotated[int, Field(ge=1)] = 30
     looks_min: Annotated[int, Field(ge=2)] = 10
     prefer: Literal["far", "near"] = "far"
     unseen_images_max: Annotated[int, Field(ge=1)] | None = None
-    standstill_m: Annotated[float, Field(gt=0.0)] = 0.01
-    standstill_rad: Annotated[float, Field(gt=0.0)] = 0.01
+    standstill_m: Annotated[float, Field(gt=0.0)] = 0.001
+    standstill_rad: Annotated[float, Field(gt=0.0)] = 0.001
+    settling_images: Annotated[int, Field(ge=0)] = 20
 
 
 class SlamSpec(Spec):

@@ -41,6 +41,7 @@ from lpet_sim.sweep.sighting import sight_recording
 from lpet_sim.terminal import bar
 from lpet_sim.vision.spec import FrontEndSpec
 
+ANCHORS = {"standstill_m": 0.02, "standstill_rad": 0.1}  # above what noise makes of a step at rest
 COMMAND = "python -m scenarios.real_data"
 KEPT = Path("out/real_data")
 QUICK_IMAGES = 300
@@ -93,8 +94,8 @@ def night_jobs() -> Iterator[Job]:
             for coupling in ("decoupled", "decoupled_pose_kept"):
                 yield on_night(retention=r, formulation=form, coupling=coupling)
     for r in (ALL, lasting(10), queue(10)):
-        yield on_night(retention=r, anchors={})
-        yield on_night(retention=r, anchors={}, formulation="first_estimates")
+        yield on_night(retention=r, anchors=ANCHORS)
+        yield on_night(retention=r, anchors=ANCHORS, formulation="first_estimates")
     for arm in (LIMITED, DECLARED):
         for form in ("right_invariant", *OTHER_FORMS):
             yield on_night(arm, retention=ALL, formulation=form)

@@ -20,6 +20,8 @@ from lpet_sim.datasets import data_folder, data_path
 from lpet_sim.errors import LpetError
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.sweep.simulate import simulate
+from lpet_sim.sweep.sweep_plan import expand
+from lpet_sim.sweep.sweep_spec import SweepSpec
 from lpet_sim.sweep.traverse import TraverseSpec
 from tests.command import TINY
 
@@ -183,6 +185,16 @@ def test_a_scenario_file_is_a_traverse(path: Path) -> None:
     spec = TraverseSpec.from_yaml(path)
     assert spec.name == path.stem
     assert TraverseSpec.from_mapping(yaml.safe_load(yaml.safe_dump(spec.to_mapping()))) == spec
+
+
+@pytest.mark.parametrize(
+    "path", sorted(SCENARIOS.glob("sweeps/*.yaml")), ids=lambda path: path.stem
+)
+def test_a_sweep_file_is_a_sweep(path: Path) -> None:
+    """It loads, is called what its file is called, and all its variants can be built."""
+    spec = SweepSpec.from_yaml(path)
+    assert spec.name == path.stem
+    assert len(expand(spec.variants)) >= len(spec.variants)
 
 
 def test_every_scenario_is_run_by_a_test() -> None:

@@ -10,15 +10,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from estimators.slam import SlamRun
-from estimators.slam_map import LASTING, LandmarkMap
+from estimators.slam import SlamRun, odometry_step
+from estimators.slam_map import LandmarkMap
 from estimators.slam_spec import SlamSpec
-from estimators.slam_values import Step
 from lpet_sim.evaluation.errors import distance_driven_m
 from lpet_sim.evaluation.figures import COLOURS
 from lpet_sim.geometry import SE3
-from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
-from lpet_sim.recording.streams import OdometryStream
+from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.sweep.sweep_once import Scene
 
 _ARROW = 20.0
@@ -68,7 +66,7 @@ def watch_map(
     errors = []
     for k in range(len(sightings)):
         rows = sightings.rows(k)
-        run.advance(_step(odometry, k))
+        run.advance(odometry_step(odometry, k))
         seen = sightings.stereo_px[rows], sightings.sigma_px[rows]
         run.see(sightings.landmark_id[rows], *seen)
         four = _held_to(run.landmarks, start, run.state.pose, true[k], places)
@@ -79,15 +77,6 @@ def watch_map(
     at_m = np.interp(sightings.t_ns, scene.truth.trajectory.t_ns, driven_m)
     world_m, rover_m, pose_m = np.array(errors).T
     return WatchedMap(at_m, world_m, rover_m, pose_m, four)
-
-
-def _step(odometry: OdometryStream, k: int) -> Step:
-    """Give the motion to an image and what is unsure of it, as the filter's own run does."""
-    lasting = np.zeros((LASTING, 6))
-    seconds = (odometry.t_ns[k] - odometry.t_ns[k - 1]) / NS_PER_S if k else 0.0
-    lasting[:3, 3:] = seconds * np.eye(3)
-    lasting[3] = odometry.scale_sigma[k] * odometry.twist[k]
-    return Step(odometry.twist[k], np.diag(np.sqrt(odometry.variance[k])), lasting)
 
 
 def _held_to(

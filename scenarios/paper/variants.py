@@ -17,9 +17,8 @@ M, N = 10, 40
 """Time to live [images] and queue [landmarks] at which variants are compared."""
 KEEP_ALL_SETS: Final = 20
 """Data sets on which full SLAM runs: a run of it takes as long as thirty others."""
-ANCHORS: Final = {"standstill_m": 0.15, "standstill_rad": 0.06}
-"""The rover settles where it is put, up to 9 cm and 0.034 rad by odometry (36 data sets looked at),
-before it stands; with the usual 1 cm more than a quarter of the data sets would have no anchors."""
+ANCHORS: Final[Mapping[str, Any]] = {}
+"""The usual anchors."""
 KINDS: Final[Mapping[str, Mapping[str, Any]]] = {
     "decoupled": {"coupling": "decoupled"},
     "coupled unobservable": {},

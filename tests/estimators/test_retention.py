@@ -226,6 +226,18 @@ def test_anchors_are_chosen_when_the_rover_sets_off_and_all_enter_before() -> No
     assert len(mapped(run)) == 5
 
 
+@pytest.mark.parametrize("moves", [0, 3, 30])
+def test_a_rover_may_settle_before_it_stands_but_not_for_ever(moves: int) -> None:
+    """Anchors are mapped after some images of motion; a rover that never stops has none."""
+    run = standing(anchors=AnchorSpec(count_max=3, looks_min=4).to_mapping())
+    for _ in range(moves):
+        look(run, list(range(10)), MOVES)
+    for _ in range(6):
+        look(run, list(range(10)))
+    look(run, list(range(10)), MOVES)
+    assert run.landmarks.pinned.sum() == (3 if moves < 20 else 0)
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_confidence_is_that_of_image_coordinates_in_every_form(form: str) -> None:
     """At entry at the start a landmark is as sure as its sighting, near or far: 3 sigma^2."""
