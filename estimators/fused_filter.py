@@ -22,8 +22,7 @@ from lpet_sim.recording.arrays import Array
 
 SIZE = 13
 _START_SIGMA = 1e-6
-# A parked rover still settles on its springs and soil: 0.1 mrad within half a minute in simulation.
-_REST_SIGMA = (5e-6, 1e-7)
+_REST_SIGMA = (1e-9, 1e-7)
 
 
 class Inputs(NamedTuple):
@@ -63,6 +62,7 @@ class Constants(NamedTuple):
         bias_walk: Their random walks, Shape (2,).
         random_walk: Angle and velocity random walk, Shape (2,).
         quantum: Of a velocity increment [m/s].
+        rest_turn: Rate at which a parked rover still turns, 1 sigma [rad/s].
         rest_block: Longest rest taken as one measurement [s].
         gate: Chi-square threshold of a rest measurement (6 degrees of freedom).
     """
@@ -75,6 +75,7 @@ class Constants(NamedTuple):
     bias_walk: Array
     random_walk: Array
     quantum: float
+    rest_turn: float
     rest_block: float
     gate: float
 
@@ -189,7 +190,7 @@ def rest_noise(duration: float, c: Constants) -> Array:
     variance = np.empty(6)
     rounding = c.quantum**2 / 6.0 / duration**2
     for i in range(3):
-        variance[i] = c.random_walk[0] ** 2 / duration + _REST_SIGMA[0] ** 2
+        variance[i] = c.random_walk[0] ** 2 / duration + c.rest_turn**2 + _REST_SIGMA[0] ** 2
         variance[3 + i] = c.random_walk[1] ** 2 / duration + rounding + _REST_SIGMA[1] ** 2
     return gaussian.independent(variance)
 

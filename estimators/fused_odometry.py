@@ -42,6 +42,8 @@ class FusedOdometrySpec(MotionSpec):
     Attributes:
         rest: What counts as standing still.
         rest_block_s: Longest rest that is taken in as one measurement.
+        rest_turn_sigma_radps: Rate at which a parked rover still turns on its springs and soil, 1
+            sigma, in each block: by 0.1 mrad within half a minute in LPET's own simulation.
         gate_probability: Share of fitting rest measurements that pass the chi-square gate.
         gyro_bias_walk_radps_rts: Rate random walk [rad/s/sqrt(s)]; LN-200 class, from the Allan
             deviation of real data at 1000-5000 s.
@@ -50,6 +52,7 @@ class FusedOdometrySpec(MotionSpec):
 
     rest: RestSpec = RestSpec()
     rest_block_s: float = Field(default=10.0, gt=0)
+    rest_turn_sigma_radps: float = Field(default=5e-6, ge=0)
     gate_probability: float = Field(default=0.999, gt=0, lt=1)
     gyro_bias_walk_radps_rts: float = Field(default=4e-9, ge=0)
     accel_bias_walk_mps2_rts: float = Field(default=8e-7, ge=0)
@@ -192,6 +195,7 @@ def _constants(
         np.array([spec.gyro_bias_walk_radps_rts, spec.accel_bias_walk_mps2_rts]),
         np.array([imu.gyro_random_walk_radps_rthz, imu.accel_random_walk_mps2_rthz]),
         imu.accel_quantum_mps,
+        spec.rest_turn_sigma_radps,
         spec.rest_block_s,
         chi_square_threshold(6, spec.gate_probability),
     )

@@ -71,7 +71,9 @@ def estimator(factor: float) -> FusedOdometry:
     """Make the filter, its own noises scaled likewise."""
     names = ("vertical_sigma_m_rtm", "gyro_bias_walk_radps_rts", "accel_bias_walk_mps2_rts")
     spec = FusedOdometry().spec
-    return FusedOdometry(spec.model_copy(update={n: factor * getattr(spec, n) for n in names}))
+    scaled = {n: factor * getattr(spec, n) for n in names}
+    # The synthetic rover stands as still as a rock.
+    return FusedOdometry(spec.model_copy(update=scaled | {"rest_turn_sigma_radps": 0.0}))
 
 
 @functools.cache
