@@ -127,6 +127,8 @@ def read_rows(path: Path) -> Rows:
     Raises:
         RowsError: The file is missing, is no Parquet file, or holds no rows of runs.
     """
+    if not Path(path).exists():
+        raise RowsError(f"there is no {path}; give the Parquet file that lpet sweep wrote")
     try:
         table = pq.read_table(path)
     except (OSError, pa.ArrowInvalid) as error:

@@ -192,6 +192,8 @@ def row_noise_px(pixels: Array) -> float:
 
 def _load(path: Path) -> dict[str, Array]:
     file = path / FILE if path.is_dir() else path
+    if not file.is_file():
+        raise RecordingError(f"there is no {file}; give the folder of Starry Night, with {FILE}")
     try:
         held: dict[str, Any] = loadmat(file)
     except (OSError, ValueError, NotImplementedError, MatReadError) as error:
