@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 import csv
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -23,104 +23,30 @@ from rich.progress import track as shown_progress
 from estimators import Estimator, build_estimator
 from estimators.frame_to_frame import FrameToFrame
 from lpet_sim.datasets import DataError, data_path
-from lpet_sim.evaluation.noise_model import corrected
 from lpet_sim.evaluation.sensor_fit import SensorFit, fit_sensor
-from lpet_sim.evaluation.sighting_tracks import CameraPath, since
-from lpet_sim.evaluation.track_kernels import Flags
 from lpet_sim.outputs import output_folder, whole_file
-from lpet_sim.recording.arrays import Array, Ints
-from lpet_sim.recording.calibration import Calibration, PoseSpec, StereoCalibration
-from lpet_sim.recording.kitti import GRAVITY_MPS2
-from lpet_sim.recording.reader import read_recording
-from lpet_sim.recording.recording import Recording
+from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.streams import Measurements, SightingStream
-from lpet_sim.recording.trajectory import Trajectory
-from lpet_sim.rng import stream
-from lpet_sim.sensors.landmark_sensor import ShownLandmarks, report_sightings
+from lpet_sim.sensors.landmark_sensor import report_sightings
 from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec, SightingNoiseSpec
 from lpet_sim.sweep.calibrate import sensor_spec, white_px
-from lpet_sim.sweep.importing import import_kitti
-from lpet_sim.sweep.sighting import sight_recording
-from lpet_sim.vision.spec import FrontEndSpec
+from scenarios.kitti.reading import READING, SLAM_EVERY
+from scenarios.kitti.world import (
+    FIRST,
+    Drive,
+    calibration_of,
+    measured_landmarks,
+    sighted,
+    strewn_landmarks,
+)
 
 COMMAND: Final = "python -m scenarios.kitti_prediction"
-CACHE: Final = Path("out/real_stereo")
-FIRST: Final = 20
 SEEDS: Final = 20
 RANSAC_SEEDS: Final = 5
 NOTHING: Final = np.zeros(6)
-DISPARITY_MIN_PX: Final = 0.5
 SLAM: Final = {"retention": {"kind": "time_to_live", "images": 3}}
-SLAM_EVERY: Final = 4
 OBTAINED: Final = "**obtained on the real images**"
-READING: Final = (
-    "*Strewn* landmarks share with the real ones how many there are, where in the image and",
-    "how far away new ones appear, and how often they are lost; *measured* ones lie where the",
-    "real ones do and are seen in the same images. Noise is drawn anew for both. Each row",
-    f"adds a cause to the one before it. The filter (time to live 3) gets one in {SLAM_EVERY}",
-    "landmarks.",
-    "",
-    "What agrees: with all that was measured, the median end error is 11 % above the obtained",
-    "one for frame-to-frame and 8 % below it for the filter, and the end lies to the same",
-    "side: short, to the right, and low. Where landmarks lie (strewn or measured) hardly",
-    "matters.",
-    "",
-    "What does not, and why:",
-    "",
-    "- Noise is not what limits vision here. White noise explains 1 % of the obtained error,",
-    "  fixed errors and wrong names another 4 %. The rest is systematic: the camera is turned",
-    "  by 0.8 deg against the frame in which the truth is given, and distances read short.",
-    "  Which calibration is at fault, the camera's or that of the truth against the camera,",
-    "  cannot be told from here.",
-    "- The systematic errors were measured on the same images and the same truth, so that the",
-    "  rows that have them test the chain and are no foresight. The held-out halves are: what",
-    "  the mounting does upwards carries over (-1.06 for -0.90 %, -0.88 for -0.90 %);",
-    "  sideways it is off by 0.6 %, a third of a degree; ahead it is off by 1 %. The camera's",
-    "  focal length and baseline cannot change from half to half, so the scale error of the",
-    "  first half is more likely the truth's, whose images before 20 are known to be off by",
-    "  over a metre. The standard errors take tracks as independent, know nothing of this,",
-    "  and are far too small here.",
-    "- The rotation at the end comes out at a quarter to a half of the obtained one: an",
-    "  attitude error of the truth that changes along the way is in no sensor's figures.",
-    "- The filter's predicted errors scatter widely (0.13 to 0.88 % without systematic",
-    "  errors): it has no odometry here, so that each step starts from the one before, among",
-    "  wrong names.",
-    "- Real matches are not Gaussian and not white: kurtosis 13, and 0.6 of the noise carries",
-    "  over to the next image. A landmark sensor has the slow part as a fixed error only.",
-)
-"""What the committed table says; a run with other data says something else."""
 Row = dict[str, str | int]
-
-
-@dataclass(frozen=True)
-class Drive:
-    """What is known of the piece of the sequence that is scored.
-
-    Attributes:
-        truth: True poses of the body at the images.
-        stereo: The declared pair.
-        sightings: What the front end saw in the real images.
-    """
-
-    truth: Trajectory
-    stereo: StereoCalibration
-    sightings: SightingStream
-
-    def piece(self, first: int, last: int) -> Drive:
-        """Give the images from one to before another."""
-        rows = slice(first, last)
-        seen = since(self.sightings, first)
-        count = last - first
-        end = int(seen.offsets[count])
-        cut = SightingStream(
-            seen.t_ns[:count].copy(),
-            seen.offsets[: count + 1].copy(),
-            seen.landmark_id[:end].copy(),
-            seen.stereo_px[:end].copy(),
-            seen.sigma_px[:end].copy(),
-        )
-        pose = self.truth.T_world_body[rows]
-        return replace(self, truth=Trajectory(self.truth.t_ns[rows].copy(), pose), sightings=cut)
 
 
 @dataclass(frozen=True)
@@ -138,103 +64,6 @@ class Arm:
     noise: SightingNoiseSpec
     misclassified: float
     shared: Array
-
-
-def sighted(folder: Path) -> Drive:
-    """Import the sequence and run the front end over it, once."""
-    run = CACHE / "kitti00_first100.rrd"
-    done = run.exists() and read_recording(run).measurements.sightings is not None
-    if not done:
-        import_kitti(folder, run)
-        sight_recording(run, run, FrontEndSpec())
-    recording: Recording = read_recording(run)
-    measurements = recording.measurements
-    assert recording.truth is not None and measurements.sightings is not None
-    assert measurements.calibration.stereo is not None
-    drive = Drive(
-        recording.truth.trajectory, measurements.calibration.stereo, measurements.sightings
-    )
-    return drive.piece(FIRST, len(drive.sightings))
-
-
-def _calibration(drive: Drive) -> Calibration:
-    start = PoseSpec.from_se3(drive.truth.T_world_body[0])
-    return Calibration(stereo=drive.stereo, T_world_body_start=start, gravity_mps2=GRAVITY_MPS2)
-
-
-def true_camera(drive: Drive, shared: Array) -> tuple[StereoCalibration, CameraPath]:
-    """Give the pair as it is and its path, where the declared one has these errors."""
-    declared = CameraPath.of(drive.truth, drive.truth.t_ns, drive.stereo)
-    camera, path = corrected(shared, drive.stereo, declared)
-    return drive.stereo.model_copy(update={"focal_px": camera[0], "baseline_m": camera[1]}), path
-
-
-def in_view(p_camera: Array, pair: StereoCalibration) -> tuple[Array, Flags]:
-    """Project points, Shape (m, 3), and tell which both images hold."""
-    deep = np.where(p_camera[:, 2:] > 1.0, p_camera, [0.0, 0.0, 1.0])
-    px = pair.project(deep)
-    size = np.array([pair.width_px, pair.width_px, pair.height_px])
-    inside = np.all((px >= 0) & (px <= size - 1), axis=1) & (p_camera[:, 2] > 1.0)
-    return px, inside & (px[:, 0] - px[:, 1] >= DISPARITY_MIN_PX)
-
-
-def measured_landmarks(
-    drive: Drive, places_m: Array, shared: Array, seed: int
-) -> tuple[ShownLandmarks, float]:
-    """Show landmarks at the places of the real ones, in the images in which those were sighted."""
-    seen = drive.sightings
-    which = np.unique(seen.landmark_id, return_inverse=True)[1]
-    image = np.repeat(np.arange(len(seen)), np.diff(seen.offsets))
-    return shown(drive, places_m[which], which, image, shared, seed), 1.0
-
-
-def strewn_landmarks(
-    drive: Drive, fit: SensorFit, shared: Array, seed: int
-) -> tuple[ShownLandmarks, float]:
-    """Show landmarks of no real place: as many new ones, where new ones are, lost as often.
-
-    A new landmark's image coordinates are drawn from those of all first sightings; it stays until
-    it leaves the view or is lost, and is detected so often that as many are seen again in the next
-    image as were.
-    """
-    rng = stream(seed, "kitti_prediction", "landmarks")
-    seen = drive.sightings
-    detection = min(fit.tracks.seen_next / (1.0 - fit.tracks.lost), 1.0)
-    image = np.repeat(np.arange(len(seen)), np.diff(seen.offsets))
-    first = np.unique(seen.landmark_id, return_index=True)[1]
-    births = np.bincount(image[first], minlength=len(seen)) / detection
-    born = np.repeat(np.arange(len(seen)), rng.poisson(births))
-    pair, path = true_camera(drive, shared)
-    drawn = np.where(born == 0, rng.integers(0, seen.offsets[1], len(born)), 0)
-    later = first[image[first] > 0]
-    drawn = np.where(born == 0, drawn, later[rng.integers(0, len(later), len(born))])
-    p_camera = pair.triangulate(seen.stereo_px[drawn])
-    places_m = path.T_camera_world[born].inverse() @ p_camera
-    life = rng.geometric(max(fit.tracks.lost, 1e-6), len(born))
-    which = np.repeat(np.arange(len(born)), np.minimum(life, len(seen) - born))
-    age = np.arange(len(which)) - np.searchsorted(which, which)
-    return shown(drive, places_m[which], which, born[which] + age, shared, seed), detection
-
-
-def shown(
-    drive: Drive, p_world: Array, which: Ints, image: Ints, shared: Array, seed: int
-) -> ShownLandmarks:
-    """Give the rows that are in view, by image, with a fixed error for each landmark."""
-    pair, path = true_camera(drive, shared)
-    px, seen = in_view(path.seen_from(image, p_world), pair)
-    rows = np.flatnonzero(seen)
-    rows = rows[np.lexsort((which[rows], image[rows]))]
-    counts = np.bincount(image[rows], minlength=len(drive.truth))
-    bias = stream(seed, "kitti_prediction", "fixed").standard_normal((int(which.max()) + 1, 3))
-    return ShownLandmarks(
-        drive.truth.t_ns.copy(),
-        np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        which[rows].astype(np.int64),
-        np.zeros(len(rows), np.uint8),
-        p_world[rows],
-        px[rows],
-        bias[which[rows]],
-    )
 
 
 def arms(fit: SensorFit, shared: Array) -> tuple[Arm, ...]:
@@ -290,7 +119,7 @@ class Runs:
         else:
             estimator = build_estimator("slam", SLAM)
             sightings = every(sightings, SLAM_EVERY)
-        given = Measurements(_calibration(drive), sightings=sightings)
+        given = Measurements(calibration_of(drive), sightings=sightings)
         end, true = estimator.estimate(given).trajectory.T_world_body[-1], drive.truth.T_world_body
         off_m = true.rotation[0].T @ (end.translation - true.translation[-1])
         return np.concatenate([off_m, (true[-1].inverse() @ end).log()[3:]])

@@ -1,0 +1,1 @@
+"""Pieces of `scenarios.kitti_prediction`."""
