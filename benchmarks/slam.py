@@ -25,7 +25,7 @@ from estimators.slam_map import LASTING, POSE
 from estimators.slam_spec import BoundedQueue, Retention, SlamSpec, TimeToLive
 from lpet_sim.errors import LpetError
 from lpet_sim.recording.arrays import Array
-from lpet_sim.recording.streams import Measurements, OdometryStream, SightingStream
+from lpet_sim.recording.streams import Measurements, OdometryStream
 from lpet_sim.rng import stream
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -195,10 +195,7 @@ def first_images(given: Measurements, images: int) -> Measurements:
     """Keep the first images of a recording."""
     seen, odometry = given.sightings, given.odometry
     assert seen is not None and odometry is not None
-    end = int(seen.offsets[images])
-    parts = seen.landmark_id[:end], seen.stereo_px[:end], seen.sigma_px[:end]
-    sightings = SightingStream(seen.t_ns[:images], seen.offsets[: images + 1], *parts)
-    o = odometry
+    sightings, o = seen.images(0, images), odometry
     twist, variance = o.twist[:images], o.variance[:images]
     short = OdometryStream(o.t_ns[:images], twist, variance, o.scale_sigma[:images])
     return Measurements(given.calibration, sightings=sightings, odometry=short)

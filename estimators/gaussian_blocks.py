@@ -57,6 +57,23 @@ def add_noise(P: Array, B_T: Array) -> None:
 
 
 @njit(cache=True)
+def add_block_noise(P: Array, first: int, B: Array) -> None:
+    """Add ``B_i B_i^T`` to each block of three, in place, for noise that each has of its own.
+
+    Args:
+        P: Covariance, Shape (first + 3 c, first + 3 c); changed.
+        first: Number of variables before the blocks.
+        B: What unit noises do to each block, Shape (c, 3, 3).
+    """
+    for i in range(len(B)):
+        row = first + 3 * i
+        for a in range(3):
+            for b in range(3):
+                for k in range(3):
+                    P[row + a, row + b] += B[i, a, k] * B[i, b, k]
+
+
+@njit(cache=True)
 def carry(P: Array, B_T: Array, first: int) -> None:
     """Let variables of the state act on others, in place: ``x += B d`` for consecutive ones d.
 

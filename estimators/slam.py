@@ -23,6 +23,7 @@ from estimators.slam_map import LASTING, LandmarkMap
 from estimators.slam_spec import AnchorSpec, BoundedQueue, SlamSpec
 from estimators.slam_state import SlamState
 from estimators.slam_values import Innovations, Step
+from estimators.thinning import spread_over_image
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
 from lpet_sim.recording.calibration import StereoCalibration
@@ -47,10 +48,11 @@ LOGGED = (
 )
 """The diagnostics, one value for each image.
 
-``matched`` sightings are of landmarks in the map, ``accepted`` and ``rejected`` ones of them passed
-or failed the checks; ``new`` and ``dropped`` landmarks entered and left; ``landmarks`` is the size
-of the state; ``nis`` the normalised innovation squared of ``nis_dof`` numbers; ``slipped`` is 1
-where odometry was not believed, ``bridged`` where too few sightings were accepted.
+``sightings`` were looked at; ``matched`` ones are of landmarks in the map, ``accepted`` and
+``rejected`` ones of them passed or failed the checks; ``new`` and ``dropped`` landmarks entered and
+left; ``landmarks`` is the size of the state; ``nis`` the normalised innovation squared of
+``nis_dof`` numbers; ``slipped`` is 1 where odometry was not believed, ``bridged`` where too few
+sightings were accepted.
 """
 
 
@@ -89,7 +91,8 @@ class Slam:
         run = SlamRun(self.spec, start, calibration, rate_sigma_radps)
         poses, covariance = list[SE3](), list[Array]()
         for k in range(len(sightings)):
-            run.advance(_step(odometry, k, poses, self.spec))
+            step = _step(odometry, k, poses, self.spec)
+            run.advance(replace(step, drift_px=float(sightings.drift_px[k])))
             rows = sightings.rows(k)
             stereo_px, sigma_px = sightings.stereo_px[rows], sightings.sigma_px[rows]
             run.see(sightings.landmark_id[rows], stereo_px, sigma_px)
@@ -114,6 +117,7 @@ class SlamRun:
         rate_sigma_radps: float = 0.0,
     ) -> None:
         self._spec = spec
+        self._size_px = calibration.width_px, calibration.height_px
         self.state = SlamState(start, calibration, spec, rate_sigma_radps)
         self._policy = build_policy(spec.retention)
         self._threshold = chi_square_threshold(3, spec.gate_probability)
@@ -124,7 +128,9 @@ class SlamRun:
 
     def advance(self, step: Step) -> None:
         """Move by odometry; when an observable filter sets off it chooses its anchors."""
-        self.state.advance(replace(step, noise=self._spec.noise_scale * step.noise))
+        scale = self._spec.noise_scale
+        step = replace(step, noise=scale * step.noise, drift_px=scale * step.drift_px)
+        self.state.advance(step)
         twist = step.twist
         self._unfixed = self._unfixed + np.abs(twist)
         if self._standing and self._spec.anchors is not None:
@@ -145,9 +151,11 @@ class SlamRun:
 
     def see(self, landmark_id: Ints, stereo_px: Array, sigma_px: Array) -> None:
         """Take in the sightings of one image pair."""
-        variance = (self._spec.noise_scale * sigma_px) ** 2
+        known = self.landmarks.slots(landmark_id) >= 0
+        rows = spread_over_image(stereo_px, known, self._size_px, self._spec.sightings_max)
+        landmark_id, stereo_px, known = landmark_id[rows], stereo_px[rows], known[rows]
         slots = self.landmarks.slots(landmark_id)
-        known = slots >= 0
+        variance = (self._spec.noise_scale * sigma_px[rows]) ** 2
         seen = self.state.innovations(slots[known], stereo_px[known], variance[known])
         slipped, seen, fits = self._gated(seen)
         accepted, nis = self._taken_in(seen, fits)

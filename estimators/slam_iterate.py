@@ -7,6 +7,9 @@ from dataclasses import replace
 from estimators import gaussian
 from estimators.slam_state import SlamState
 from estimators.slam_values import Innovations
+from lpet_sim.recording.arrays import Array
+
+Mean = tuple[Array, Array, Array, Array, Array, Array]
 
 
 def relinearised(
@@ -27,7 +30,7 @@ def relinearised(
         Bell and Cathey (1993), The iterated Kalman filter update as a Gauss-Newton method
         [recalled].
     """
-    start, dx = state.mean(), None
+    start, dx = _mean(state), None
     for _ in range(rounds):
         HP, S = state.joint(believed)
         dx = HP.T @ gaussian.cholesky_solve(S, believed.r.reshape(-1, 1))[:, 0]
@@ -35,5 +38,18 @@ def relinearised(
         believed = state.innovations(believed.slots, believed.z, believed.variance)
         believed = replace(believed, r=believed.r + believed.moved_by(dx))
         there = state.innovations(known.slots, known.z, known.variance)
-        state.restore(start)
+        _restore(state, start)
     return known if dx is None else replace(there, r=there.r + there.moved_by(dx))
+
+
+def _mean(state: SlamState) -> Mean:
+    """Give a copy of the estimate without its covariance."""
+    m = state.landmarks
+    hosts = m.R_world_host.copy(), m.p_world_host.copy()
+    return state.R, state.p, state.lasting, m.x.copy(), *hosts
+
+
+def _restore(state: SlamState, mean: Mean) -> None:
+    """Put an estimate back that `_mean` gave, for the same slots."""
+    m = state.landmarks
+    state.R, state.p, state.lasting, m.x[:], m.R_world_host[:], m.p_world_host[:] = mean

@@ -270,27 +270,3 @@ def turning_noise(
             d = _numbers_moved(camera, far, P, (dX, dY, dZ, 0.0))
             for i in range(3):
                 B_T[m, 6 + 3 * s + i] += d[i]
-
-
-@njit(cache=True)
-def in_hosts(
-    camera: Array, numbers: tuple[Array, Array, Array], alive: Array, P: Array, out: Array
-) -> None:
-    """Give disparity and summed variance of what host cameras see of their landmarks, in place.
-
-    Args:
-        camera: `observation.camera_vector`.
-        numbers: As in `linearise`.
-        alive: 1 where there is a landmark, Shape (c,).
-        P: Covariance of the state, Shape (6 + 3 c, 6 + 3 c).
-        out: Takes both [px, px^2], Shape (2, c), 0 where there is no landmark.
-    """
-    out[:] = 0.0
-    D = np.empty((3, 3))
-    for s in np.flatnonzero(alive):
-        point, basis = homogeneous(camera, numbers[2][s], numbers[0][s])
-        out[0, s] = camera[0] * camera[3] * point[3] / point[2]
-        for k in range(3):
-            D[k, 0], D[k, 1], D[k, 2] = push(camera, point, basis[k])
-        cov = np.ascontiguousarray(P[6 + 3 * s : 9 + 3 * s, 6 + 3 * s : 9 + 3 * s])
-        out[1, s] = np.trace(D.T @ cov @ D)

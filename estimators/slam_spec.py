@@ -113,6 +113,8 @@ class SlamSpec(Spec):
         association_check: Beside the gate of each sighting: ``none``, or ``one_point_ransac``.
         gate_probability: Share of fitting sightings that pass their chi-square gate.
         sightings_min: An image with fewer accepted sightings counts as bridged by odometry.
+        sightings_max: At most this many sightings of an image are taken, spread over it: an image
+            costs the cube of their number, and the square of the landmarks' that stay.
         far_disparity_sigmas: A landmark whose disparity is below this many of its standard
             deviations when it enters is far: it is held as image coordinates, not as a place.
         misfits_max: A landmark leaves after this many sightings in a row that do not fit.
@@ -139,6 +141,7 @@ class SlamSpec(Spec):
     association_check: Literal["none", "one_point_ransac"] = "one_point_ransac"
     gate_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.999
     sightings_min: Annotated[int, Field(ge=0)] = 3
+    sightings_max: Annotated[int, Field(ge=1)] = 120
     far_disparity_sigmas: Annotated[float, Field(ge=0.0)] = 5.0
     misfits_max: Annotated[int, Field(ge=1)] = 3
     slip_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5

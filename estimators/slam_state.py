@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from estimators import gaussian, gaussian_blocks, slam_gate, slam_kernels
+from estimators import gaussian, gaussian_blocks, slam_gate, slam_hosts, slam_kernels
 from estimators.jacobians import hat, se3_exp
 from estimators.observation import camera_vector, transfer
 from estimators.slam_kernels import FIRST_ESTIMATES, RELATIVE, RIGHT_INVARIANT, STANDARD
@@ -24,7 +24,6 @@ FORMS = {
     ("right_invariant", "world"): RIGHT_INVARIANT,
     ("right_invariant", "keyframe"): RELATIVE,
 }
-Mean = tuple[Array, Array, Array, Array, Array, Array]
 _START_VARIANCE = 1e-12
 _GROWTH = 8
 _POSE_ROWS = np.arange(POSE)
@@ -99,6 +98,15 @@ class SlamState:
         self._predicted = self.R, self.p
         gaussian_blocks.carry(self.P, self._directions(step.lasting), POSE)
         self.disturb(step.noise)
+        if step.drift_px > 0.0:
+            self._drift(step.drift_px * math.sqrt(float(np.linalg.norm(twist[:3]))))
+
+    def _drift(self, sigma_px: float) -> None:
+        """Let what stands for each landmark in its host's image walk, 1 sigma [px]."""
+        m, by_z = self.landmarks, np.empty((self.landmarks.capacity, 3, 3))
+        x = m.x_first if self._form == FIRST_ESTIMATES else m.x
+        slam_hosts.by_sighting(self._camera, x, m.far, m.alive, by_z)
+        gaussian_blocks.add_block_noise(self.P, POSE, sigma_px * by_z)
 
     def disturb(self, noise: Array) -> None:
         """Add noise to the right perturbation of the pose.
@@ -150,17 +158,6 @@ class SlamState:
         slam_gate.project_covariance(self.P, seen.rows, seen.H, seen.G, HP)
         slam_gate.innovation_covariance(HP, seen.rows, seen.H, seen.G, seen.variance, S)
         return HP, S
-
-    def mean(self) -> Mean:
-        """Give a copy of the estimate without its covariance."""
-        m = self.landmarks
-        hosts = m.R_world_host.copy(), m.p_world_host.copy()
-        return self.R, self.p, self.lasting, m.x.copy(), *hosts
-
-    def restore(self, mean: Mean) -> None:
-        """Put an estimate back that `mean` gave, for the same slots."""
-        m = self.landmarks
-        self.R, self.p, self.lasting, m.x[:], m.R_world_host[:], m.p_world_host[:] = mean
 
     def correct(self, r: Array, HP: Array, S: Array) -> float:
         """Take sightings in and give their normalised innovation squared.
@@ -288,7 +285,7 @@ class SlamState:
         """Give disparity [px] and summed variance [px^2] of landmarks in their hosts, (c,)."""
         m = self.landmarks
         out = np.empty((2, m.capacity))
-        slam_kernels.in_hosts(self._camera, m.numbers, m.alive, self.P, out)
+        slam_hosts.in_hosts(self._camera, m.numbers, m.alive, self.P, out)
         return out[0], out[1]
 
     def _camera_pose(self, R: Array, p: Array) -> tuple[Array, Array]:

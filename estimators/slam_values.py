@@ -62,8 +62,10 @@ class Step:
         noise: What unit noises do, Shape (k, 6).
         lasting: What the lasting errors do: turning at 1 rad/s about x, y, z, and scale, by one
             standard deviation, Shape (4, 6).
+        drift_px: Random walk of sightings of a landmark with the distance [px/sqrt(m)].
     """
 
     twist: Array
     noise: Array
     lasting: Array
+    drift_px: float = 0.0

@@ -131,15 +131,7 @@ class Runs:
 
 def every(sightings: SightingStream, step: int) -> SightingStream:
     """Keep one in so many landmarks, for a filter whose cost grows with their square."""
-    keep = sightings.landmark_id % step == 0
-    before = np.concatenate([[0], np.cumsum(keep)])
-    return SightingStream(
-        sightings.t_ns.copy(),
-        before[sightings.offsets].astype(np.int64),
-        sightings.landmark_id[keep],
-        sightings.stereo_px[keep],
-        sightings.sigma_px[keep],
-    )
+    return sightings.chosen(sightings.landmark_id % step == 0)
 
 
 def row(piece: str, estimator: str, what: str, drive: Drive, found: list[Array]) -> Row:

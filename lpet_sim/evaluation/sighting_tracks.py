@@ -125,11 +125,4 @@ def since(sightings: SightingStream, image: int) -> SightingStream:
             f"image {image} is not there: the recording has {len(sightings)} images; "
             f"give one from 0 to {len(sightings) - 1}"
         )
-    row = int(sightings.offsets[image])
-    return SightingStream(
-        sightings.t_ns[image:].copy(),
-        sightings.offsets[image:] - row,
-        sightings.landmark_id[row:].copy(),
-        sightings.stereo_px[row:].copy(),
-        sightings.sigma_px[row:].copy(),
-    )
+    return sightings.images(image, len(sightings))

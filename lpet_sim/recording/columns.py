@@ -8,7 +8,7 @@ and any number in a ragged one.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from typing import Any, TypeVar
 
 import numpy as np
@@ -61,7 +61,7 @@ def take_apart(struct: ArrayStruct) -> Iterator[tuple[str, Column]]:
 
 
 def put_together(kind: type[Struct], prefix: str, columns: Mapping[str, Column]) -> Struct | None:
-    """Make a stream from the columns under a prefix.
+    """Make a stream from the columns under a prefix; those with a default may be absent.
 
     Returns:
         The stream, None where there is none.
@@ -73,7 +73,12 @@ def put_together(kind: type[Struct], prefix: str, columns: Mapping[str, Column])
     }
     if not held:
         return None
-    return kind(**{field.name: _field(field.name, held) for field in fields(kind)})  # type: ignore[arg-type]
+    needed = [
+        field.name
+        for field in fields(kind)  # type: ignore[arg-type]
+        if field.default_factory is MISSING or field.name in held
+    ]
+    return kind(**{name: _field(name, held) for name in needed})
 
 
 def _field(name: str, held: Mapping[str, Column]) -> NDArray[Any] | SE3:

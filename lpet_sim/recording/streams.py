@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,9 @@ class OdometryStream(ArrayStruct):
     scale_sigma: Array
 
 
+_SIGHTED = ("landmark_id", "stereo_px", "sigma_px")
+
+
 @dataclass(frozen=True, eq=False)
 class SightingStream(ArrayStruct):
     """Landmark sightings, ragged: those of image i are rows ``offsets[i]:offsets[i + 1]``.
@@ -74,6 +77,8 @@ class SightingStream(ArrayStruct):
         landmark_id: Which landmark is seen, Shape (m,), int64; unique within an image.
         stereo_px: (u_left, u_right, v) [px], Shape (m, 3).
         sigma_px: Declared noise of each image coordinate, 1 sigma [px], Shape (m,).
+        drift_px: Declared random walk of what stands for a landmark in the images, with the
+            distance driven, 1 sigma [px/sqrt(m)], Shape (n,); zeros if it is not given.
     """
 
     t_ns: Ints
@@ -81,11 +86,12 @@ class SightingStream(ArrayStruct):
     landmark_id: Ints
     stereo_px: Array
     sigma_px: Array
+    drift_px: Array = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def ragged_fields(cls) -> frozenset[str]:
         """Name the arrays whose length is not that of ``t_ns``."""
-        return frozenset({"offsets", "landmark_id", "stereo_px", "sigma_px"})
+        return frozenset({"offsets", *_SIGHTED})
 
     def __post_init__(self) -> None:
         """Check the offsets against the rows.
@@ -93,6 +99,8 @@ class SightingStream(ArrayStruct):
         Raises:
             RecordingError: Offsets and rows do not fit together.
         """
+        if len(self.drift_px) == 0:
+            object.__setattr__(self, "drift_px", np.zeros(len(self.t_ns)))
         super().__post_init__()
         rows = len(self.landmark_id)
         counts = np.diff(self.offsets)
@@ -104,6 +112,23 @@ class SightingStream(ArrayStruct):
     def rows(self, image: int) -> slice:
         """Give the rows of one image."""
         return slice(int(self.offsets[image]), int(self.offsets[image + 1]))
+
+    def images(self, first: int, last: int) -> Self:
+        """Give the images from one to before another."""
+        rows = slice(int(self.offsets[first]), int(self.offsets[last]))
+        return replace(
+            self,
+            t_ns=self.t_ns[first:last].copy(),
+            offsets=self.offsets[first : last + 1] - self.offsets[first],
+            drift_px=self.drift_px[first:last].copy(),
+            **{name: getattr(self, name)[rows].copy() for name in _SIGHTED},
+        )
+
+    def chosen(self, keep: NDArray[np.bool_]) -> Self:
+        """Give the sightings chosen, Shape (m,); every image stays."""
+        before = np.concatenate([[0], np.cumsum(keep)]).astype(np.int64)
+        rows = {name: getattr(self, name)[keep] for name in _SIGHTED}
+        return replace(self, offsets=before[self.offsets], **rows)
 
 
 class StereoImages(Protocol):

@@ -115,6 +115,7 @@ class StereoPipeline:
             seen.landmark_id,
             seen.stereo_px,
             seen.sigma_px,
+            np.array([self._front_end.drift_px]),
         )
         return TakenPair(t_ns, left, right, sightings)
 

@@ -19,7 +19,7 @@ from lpet_sim.evaluation.result import BAD_COVARIANCE, EXCEPTION
 from lpet_sim.outputs import whole_file
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.recording import Recording
-from lpet_sim.recording.streams import OdometryStream, SightingStream
+from lpet_sim.recording.streams import OdometryStream
 from lpet_sim.recording.truth import BodyTruth, Truth
 
 Row = dict[str, Any]
@@ -66,9 +66,7 @@ def first_images(recording: Recording, count: int) -> Recording:
     """Cut a recording whose odometry and truth have the times of its images."""
     m, truth = recording.measurements, recording.truth
     assert m.sightings is not None and m.odometry is not None and truth is not None
-    s, o, b, rows = m.sightings, m.odometry, truth.body, slice(0, m.sightings.offsets[count])
-    seen = (s.landmark_id[rows], s.stereo_px[rows], s.sigma_px[rows])
-    sightings = SightingStream(s.t_ns[:count], s.offsets[: count + 1], *seen)
+    o, b, sightings = m.odometry, truth.body, m.sightings.images(0, count)
     t_ns, twist = o.t_ns[:count], o.twist[:count]
     odometry = OdometryStream(t_ns, twist, o.variance[:count], o.scale_sigma[:count])
     body = BodyTruth.from_poses(b.t_ns[:count], b.T_world_body[:count])

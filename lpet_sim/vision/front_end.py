@@ -56,6 +56,11 @@ class FrontEnd:
         self._next_id = 0
         self._gallery = self._new(0)
 
+    @property
+    def drift_px(self) -> float:
+        """The declared random walk of tracks with the distance driven [px/sqrt(m)]."""
+        return self._spec.refine.drift_px
+
     def track(self, left: Image, right: Image) -> ImageSightings:
         """Find the landmarks of the next image pair.
 
@@ -181,4 +186,5 @@ def sight(
         np.concatenate([np.zeros(0, np.int64), *(part.landmark_id for part in parts)]),
         np.concatenate([np.zeros((0, 3)), *(part.stereo_px for part in parts)]),
         np.concatenate([np.zeros(0), *(part.sigma_px for part in parts)]),
+        np.full(len(parts), spec.refine.drift_px),
     )

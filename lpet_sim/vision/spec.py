@@ -89,6 +89,8 @@ class RefineSpec(Spec):
         correlation_min: Least normalised correlation of aligned patches.
         sigma_floor_px: Error of an aligned image coordinate that patch noise does not explain.
         sigma_keypoint_px: Error of a bare SIFT keypoint, where there is no patch to align.
+        drift_px: Random walk of what a track stands for, with the distance driven [px/sqrt(m)]:
+            edges of rocks against the ground behind them, patches seen from a new side.
     """
 
     temporal: bool = True
@@ -98,6 +100,7 @@ class RefineSpec(Spec):
     correlation_min: float = Field(default=0.9, gt=0, lt=1)
     sigma_floor_px: float = Field(default=0.1, gt=0)
     sigma_keypoint_px: float = Field(default=0.5, gt=0)
+    drift_px: float = Field(default=0.3, ge=0)
 
 
 class FrontEndSpec(Spec):

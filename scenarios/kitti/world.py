@@ -10,7 +10,7 @@ import numpy as np
 
 from lpet_sim.evaluation.noise_model import corrected
 from lpet_sim.evaluation.sensor_fit import SensorFit
-from lpet_sim.evaluation.sighting_tracks import CameraPath, since
+from lpet_sim.evaluation.sighting_tracks import CameraPath
 from lpet_sim.evaluation.track_kernels import Flags
 from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.recording.calibration import Calibration, PoseSpec, StereoCalibration
@@ -47,16 +47,7 @@ class Drive:
     def piece(self, first: int, last: int) -> Drive:
         """Give the images from one to before another."""
         rows = slice(first, last)
-        seen = since(self.sightings, first)
-        count = last - first
-        end = int(seen.offsets[count])
-        cut = SightingStream(
-            seen.t_ns[:count].copy(),
-            seen.offsets[: count + 1].copy(),
-            seen.landmark_id[:end].copy(),
-            seen.stereo_px[:end].copy(),
-            seen.sigma_px[:end].copy(),
-        )
+        cut = self.sightings.images(first, last)
         pose = self.truth.T_world_body[rows]
         return replace(self, truth=Trajectory(self.truth.t_ns[rows].copy(), pose), sightings=cut)
 
