@@ -34,11 +34,7 @@ def recorded(seed: int, images: int, noise: float = 1.0) -> Measurements:
 
 def kept(rows: SightingStream, keep: Array) -> SightingStream:
     """Keep some sightings."""
-    image = np.repeat(np.arange(len(rows)), np.diff(rows.offsets))
-    counts = np.bincount(image[keep], minlength=len(rows))
-    offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    parts = rows.landmark_id[keep], rows.stereo_px[keep], rows.sigma_px[keep]
-    return SightingStream(rows.t_ns.copy(), offsets, *parts)
+    return rows.chosen(keep)
 
 
 def sight_only(given: Measurements, keep: Array) -> Measurements:

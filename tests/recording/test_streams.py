@@ -8,6 +8,7 @@ import pytest
 from lpet_sim.errors import RecordingError
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.calibration import Calibration
+from lpet_sim.recording.columns import put_together, take_apart
 from lpet_sim.recording.streams import (
     ImuStream,
     Measurements,
@@ -110,3 +111,14 @@ def test_a_stream_that_is_absent_is_named_with_those_that_are_there() -> None:
         measurements.require("wheels", "imu")
     with pytest.raises(RecordingError, match=r"it has: none"):
         Measurements(Calibration()).require("sightings")
+
+
+def test_a_declared_drift_survives_the_columns_and_recordings_without_one_say_zero() -> None:
+    """Recordings made before tracks could be declared to slide stay readable."""
+    seen = _sightings(drift_px=np.array([0.1, 0.2, 0.3]))
+    columns = {f"seen/{name}": column for name, column in take_apart(seen)}
+    again = put_together(SightingStream, "seen", columns)
+    assert again is not None and again.equals(seen)
+    del columns["seen/drift_px"]
+    older = put_together(SightingStream, "seen", columns)
+    assert older is not None and older.drift_px.tolist() == [0.0, 0.0, 0.0]
