@@ -218,7 +218,7 @@ def demo(
     seed: SeedOption = 1,
 ) -> None:
     """Drive among rocks, localize, and score: the whole chain in minutes."""
-    from lpet_sim.study import run_demo
+    from lpet_sim.study.one_traverse import run_demo
     from lpet_sim.sweep.report import score_tables
 
     with bar("drive, localize, score") as progress:

@@ -29,7 +29,7 @@ from lpet_sim.evaluation.slip_match import SlipMatch
 from lpet_sim.outputs import output_folder, whole_file
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.sensors.camera_spec import DeclaredErrorSpec
-from lpet_sim.study import SCENARIOS
+from lpet_sim.study.one_traverse import SCENARIOS
 from lpet_sim.sweep.miscalibration import miscalibrate
 from lpet_sim.sweep.score import estimate_recording, score_recording
 from lpet_sim.sweep.simulate import simulate

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from lpet_sim.rover.spec import DriveSpec, ForcedSlip
 from lpet_sim.sensors.camera_spec import LOCCAM_FOCAL_PX, GroundDetailSpec, StereoCameraSpec
-from lpet_sim.study import SCENARIOS, run_traverse
+from lpet_sim.study.one_traverse import SCENARIOS, run_traverse
 from lpet_sim.sweep.report import score_tables
 from lpet_sim.sweep.traverse import ImagesSpec, TraverseSpec
 

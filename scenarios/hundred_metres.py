@@ -36,7 +36,7 @@ from lpet_sim.outputs import output_folder, whole_file
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rng import stream
 from lpet_sim.sensors.s_curve import SCurveSpec, s_curve_run
-from lpet_sim.study import SCENARIOS
+from lpet_sim.study.one_traverse import SCENARIOS
 
 Row = dict[str, Any]
 

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 from lpet_sim.outputs import output_folder
-from lpet_sim.study import SCENARIOS
+from lpet_sim.study.one_traverse import SCENARIOS
 from lpet_sim.sweep.simulate import simulate
 from lpet_sim.sweep.traverse import TraverseSpec
 

@@ -33,7 +33,7 @@ from lpet_sim.rover.drive import drive, start_of
 from lpet_sim.rover.scene import Scene, build_scene
 from lpet_sim.rover.spec import DriveSpec, RoverSpec
 from lpet_sim.soil.load import load_soil
-from lpet_sim.study import SCENARIOS
+from lpet_sim.study.one_traverse import SCENARIOS
 from lpet_sim.terrain.load import load_terrain_spec
 from lpet_sim.terrain.spec import ReliefSpec, SoilClass, TerrainSpec
 from lpet_sim.terrain.terrain import build_terrain

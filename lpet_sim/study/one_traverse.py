@@ -18,7 +18,7 @@ from lpet_sim.sweep.traverse import TraverseSpec
 from lpet_sim.terrain.box import Box
 from lpet_sim.terrain.terrain import build_terrain
 
-SCENARIOS = Path(__file__).resolve().parents[1] / "scenarios"
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
 _SIMULATED, _ESTIMATED = 0.9, 0.97
 _PLAN_MARGIN_M = 3.0
