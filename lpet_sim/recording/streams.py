@@ -198,11 +198,10 @@ class Measurements:
         present = [name for name in streams if getattr(self, name) is not None]
         for name in names:
             if name not in present:
-                hint = (
-                    "; run 'lpet sight' first"
-                    if name == "sightings" and "images" in present
-                    else ""
-                )
+                hint = ""
+                if name == "sightings":
+                    how = "sight" if "images" in present else "sense"
+                    hint = f"; run 'lpet {how}' first"
                 held = ", ".join(present) or "none"
                 raise RecordingError(f"the recording has no stream '{name}' (it has: {held}){hint}")
 

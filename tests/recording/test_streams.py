@@ -109,7 +109,7 @@ def test_a_stream_that_is_absent_is_named_with_those_that_are_there() -> None:
     measurements.require("wheels")
     with pytest.raises(RecordingError, match=r"no stream 'imu' \(it has: wheels\)$"):
         measurements.require("wheels", "imu")
-    with pytest.raises(RecordingError, match=r"it has: none"):
+    with pytest.raises(RecordingError, match=r"it has: none\); run .lpet sense. first$"):
         Measurements(Calibration()).require("sightings")
 
 
