@@ -21,6 +21,7 @@ from lpet_sim.recording.streams import SightingStream
 from lpet_sim.recording.trajectory import Trajectory
 from lpet_sim.recording.truth import BodyTruth
 from lpet_sim.rng import stream
+from lpet_sim.sensors.landmark_drift import sizes, slide, walks
 from lpet_sim.sensors.landmark_kernels import draw_sightings
 from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec, SightingNoiseSpec
 from lpet_sim.sensors.landmark_view import LandmarkView
@@ -39,6 +40,7 @@ class ShownLandmarks:
         p_world: Places [m], Shape (m, 3).
         stereo_px: True (u_left, u_right, v) [px], Shape (m, 3).
         bias: The landmark's fixed errors over their 1 sigma, Shape (m, 3).
+        T_world_camera: True poses of the left eye in the images, Shape (n,).
     """
 
     t_ns: Ints
@@ -48,6 +50,7 @@ class ShownLandmarks:
     p_world: Array
     stereo_px: Array
     bias: Array
+    T_world_camera: SE3
 
     @property
     def image(self) -> Ints:
@@ -101,8 +104,14 @@ def show_landmarks(
     }
     offsets = np.concatenate([[0], np.cumsum([len(image.rows) for image in images])])
     stereo_px = np.concatenate([image.stereo_px for image in images])
+    names = picked.pop("id")
     return ShownLandmarks(
-        t_ns, offsets.astype(np.int64), picked.pop("id"), stereo_px=stereo_px, **picked
+        t_ns,
+        offsets.astype(np.int64),
+        names,
+        stereo_px=stereo_px,
+        T_world_camera=T_world_camera,
+        **picked,
     )
 
 
@@ -127,7 +136,8 @@ def report_sightings(
 ) -> SightingStream:
     """Draw what a front end reports of the landmarks that are shown.
 
-    ``z = h(p) + bias + white noise``, the disparity's bias taken off ``u_right``, rounded.
+    ``z = h(p) + bias + white noise``, the disparity's bias taken off ``u_right``, rounded; p is
+    where the landmark has slid to, and one that has slid out of the images is not reported.
 
     Args:
         shown: What the images show.
@@ -138,17 +148,47 @@ def report_sightings(
     key = int(stream(seed, "landmarks", "sightings").integers(2**62))
     uniforms, normals = draw_sightings(key, shown.t_ns[shown.image], shown.landmark_id)
     found = uniforms[:, 0] < spec.detection_probability
+    noise, true_px = spec.noise, shown.stereo_px
+    if noise.drift_px > 0:
+        true_px, seen = _slid(shown, calibration, spec, seed)
+        found &= seen
     names = _misnamed(shown, found, uniforms, spec.misclassification_probability)
-    noise = spec.noise
     sigma = np.array([noise.sigma_left_px, noise.sigma_right_px, noise.sigma_v_px])
-    stereo_px = shown.stereo_px + noise.bias_sigma_px * shown.bias + sigma * normals
+    stereo_px = true_px + noise.bias_sigma_px * shown.bias + sigma * normals
     stereo_px[:, 1] -= spec.disparity_bias_px
     if noise.resolution_px > 0:
         stereo_px = np.round(stereo_px / noise.resolution_px) * noise.resolution_px
     counts = np.bincount(shown.image[found], minlength=len(shown.t_ns))
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     declared = np.full(int(offsets[-1]), declared_sigma_px(noise, calibration))
-    return SightingStream(shown.t_ns.copy(), offsets, names[found], stereo_px[found], declared)
+    drift_px = np.full(len(shown.t_ns), declared_drift_px(noise))
+    return SightingStream(
+        shown.t_ns.copy(), offsets, names[found], stereo_px[found], declared, drift_px
+    )
+
+
+def _slid(
+    shown: ShownLandmarks, calibration: StereoCalibration, spec: LandmarkSensorSpec, seed: int
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Give where landmarks are seen that walk [px], Shape (m, 3), and whether they are, (m,)."""
+    T_world_body = shown.T_world_camera @ calibration.T_body_camera.se3().inverse()
+    driven_m = Trajectory(shown.t_ns, T_world_body).arc_length_m
+    key = int(stream(seed, "landmarks", "drift").integers(2**62))
+    walk = walks(shown.landmark_id, shown.image, shown.t_ns, driven_m, key)
+    own_px = spec.noise.drift_px * sizes(shown.landmark_id, spec.noise.drift_spread, key)
+    return slide(
+        shown.stereo_px,
+        shown.landmark_id,
+        shown.image,
+        shown.T_world_camera,
+        own_px[:, None] * walk,
+        true_camera(calibration, spec),
+    )
+
+
+def declared_drift_px(noise: SightingNoiseSpec) -> float:
+    """Give what an estimator is told of how tracks slide, 1 sigma [px/sqrt(m)]."""
+    return noise.drift_px if noise.declared_drift_px is None else noise.declared_drift_px
 
 
 def declared_sigma_px(noise: SightingNoiseSpec, calibration: StereoCalibration) -> float:

@@ -78,6 +78,12 @@ class SightingNoiseSpec(Spec):
         resolution_px: Coordinates are rounded to multiples of this; 0: not at all.
         declared_sigma_px: What an estimator is told of the noise; None: the root mean square of the
             three white ones, or the calibration's where they are all 0.
+        drift_px: Random walk of what stands for a landmark, in the image that showed it first, with
+            the distance driven, 1 sigma of each coordinate, root mean square over landmarks
+            [px/sqrt(m)]; 0: tracks do not slide. docs/slam.md has what rendered images show.
+        drift_spread: Standard deviation of the logarithm of a landmark's own drift, drawn once for
+            it; 0: all slide alike.
+        declared_drift_px: What an estimator is told of it [px/sqrt(m)]; None: the true one.
     """
 
     sigma_left_px: NotNegative = 0.5
@@ -86,6 +92,9 @@ class SightingNoiseSpec(Spec):
     bias_sigma_px: NotNegative = 0.0
     resolution_px: NotNegative = 0.0
     declared_sigma_px: Positive | None = None
+    drift_px: NotNegative = 0.0
+    drift_spread: Annotated[float, Field(ge=0.0, le=3.0)] = 0.0
+    declared_drift_px: NotNegative | None = None
 
 
 class LandmarkSensorSpec(Spec):

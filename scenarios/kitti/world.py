@@ -147,4 +147,5 @@ def shown(
         p_world[rows],
         px[rows],
         bias[which[rows]],
+        path.T_camera_world.inverse(),
     )
