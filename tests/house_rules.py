@@ -25,7 +25,15 @@ MAY_IMPORT: dict[str, set[str]] = {
     "terrain": {"foundation", "geometry", "recording", "soil"},
     "rover": {"foundation", "geometry", "recording", "soil", "terrain"},
     "sensors": {"foundation", "geometry", "recording", "soil", "terrain", "rover"},
-    "planning": {"foundation", "geometry", "recording", "soil", "terrain", "rover"},
+    "planning": {
+        "foundation",
+        "geometry",
+        "recording",
+        "evaluation",
+        "soil",
+        "terrain",
+        "rover",
+    },
     "rig": {"foundation", "geometry", "recording", "soil", "terrain", "rover"},
 }
 MAY_IMPORT["terminal"] = {"foundation"}
@@ -35,6 +43,7 @@ MAY_IMPORT["study"] = {*MAY_IMPORT}
 MAY_IMPORT["cli_rig"] = {*MAY_IMPORT} - {"study"}
 MAY_IMPORT["cli_report"] = {*MAY_IMPORT} - {"study", "cli_rig"}
 MAY_IMPORT["cli_sweep"] = {*MAY_IMPORT} - {"study", "cli_rig"}
+MAY_IMPORT["cli_tradeoff"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report", "cli_sweep"}
 MAY_IMPORT["cli"] = {*MAY_IMPORT}
 """Which rooms each room may import, besides itself."""
 
@@ -44,7 +53,7 @@ QUARANTINE: dict[str, set[str]] = {
         "lpet_sim/rover/scene.py",
         "lpet_sim/sensors/render_scene.py",
     },
-    "ompl": {"lpet_sim/planning/route.py"},
+    "ompl": {"lpet_sim/planning/route.py", "lpet_sim/planning/search.py"},
     "cv2": {"lpet_sim/vision/detect.py"},
     "rerun": {
         "lpet_sim/recording/store.py",
@@ -61,6 +70,7 @@ QUARANTINE: dict[str, set[str]] = {
         "lpet_sim/cli_report.py",
         "lpet_sim/cli_rig.py",
         "lpet_sim/cli_sweep.py",
+        "lpet_sim/cli_tradeoff.py",
     },
 }
 """The files that may import a library, so that its upgrade touches one room."""
