@@ -43,6 +43,7 @@ MAY_IMPORT["study"] = {*MAY_IMPORT}
 MAY_IMPORT["cli_rig"] = {*MAY_IMPORT} - {"study"}
 MAY_IMPORT["cli_report"] = {*MAY_IMPORT} - {"study", "cli_rig"}
 MAY_IMPORT["cli_sweep"] = {*MAY_IMPORT} - {"study", "cli_rig"}
+MAY_IMPORT["cli_reach"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report", "cli_sweep"}
 MAY_IMPORT["cli_tradeoff"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report", "cli_sweep"}
 MAY_IMPORT["cli"] = {*MAY_IMPORT}
 """Which rooms each room may import, besides itself."""
@@ -67,6 +68,7 @@ QUARANTINE: dict[str, set[str]] = {
     "joblib": {"lpet_sim/sweep/sweep_pool.py"},
     "typer": {
         "lpet_sim/cli.py",
+        "lpet_sim/cli_reach.py",
         "lpet_sim/cli_report.py",
         "lpet_sim/cli_rig.py",
         "lpet_sim/cli_sweep.py",

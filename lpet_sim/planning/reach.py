@@ -1,0 +1,215 @@
+"""Whether a goal can be reached from many starts on one terrain, and if not, why."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from lpet_sim.errors import BlockedPlaceError
+from lpet_sim.planning.clearance import Ground, Point
+from lpet_sim.planning.map_path import length_of, wave_from
+from lpet_sim.planning.mobility_map import Bools, MobilityMap, map_mobility, regions
+from lpet_sim.planning.reach_result import Outcome, StartResult, TerrainResult
+from lpet_sim.planning.reach_spec import Case, ReachSpec
+from lpet_sim.planning.search import Pose, search_curves, search_straights
+from lpet_sim.recording.arrays import Ints
+from lpet_sim.rng import stream
+from lpet_sim.terrain.terrain import build_terrain
+
+START_BLOCKED = "start blocked"
+GOAL_BLOCKED = "goal blocked"
+ROCKS = "walled in by rocks"
+SLOPE = "walled in by steep ground"
+BOTH = "walled in by rocks and steep ground"
+TIGHT_START = "start too tight to turn"
+TIGHT_GOAL = "goal too tight to turn"
+BUDGET = "no way found within the budget"
+
+_DRAWS = 2000
+_GOAL_HEADINGS = 8
+_DIGITS = 4
+
+
+def reach_on(case: Case, spec: ReachSpec) -> TerrainResult:
+    """Build one terrain of a study and find out from which starts its goal can be reached.
+
+    Args:
+        case: Which terrain.
+        spec: The study.
+
+    Raises:
+        LpetError: The terrain cannot be built or mapped.
+    """
+    began_s = time.process_time()
+    ground = build_terrain(case.terrain, case.seed)
+    starts = tuple(reach_from_all(ground, spec, case.seed))
+    took_s = time.process_time() - began_s
+    return TerrainResult(case.abundance, case.factor, case.index, case.seed, took_s, starts)
+
+
+def reach_from_all(ground: Ground, spec: ReachSpec, seed: int) -> list[StartResult]:
+    """Find out from which starts a goal can be reached on given ground.
+
+    Args:
+        ground: The terrain.
+        spec: The study; its terrain is not looked at.
+        seed: Of the random starts and of the searches.
+    """
+    return Reacher(map_mobility(ground, spec.box, spec.mobility, spec.cell_m), spec, seed).all()
+
+
+class Reacher:
+    """Answers for one map and goal."""
+
+    def __init__(self, mobility_map: MobilityMap, spec: ReachSpec, seed: int) -> None:
+        """Look at the goal once for all starts.
+
+        Args:
+            mobility_map: The map.
+            spec: The study.
+            seed: Of the random starts and of the searches.
+        """
+        self.map, self._spec, self._seed = mobility_map, spec, seed
+        rows, columns = mobility_map.nodes_within(spec.goal_m, spec.goal_radius_m)
+        self._goal_nodes = rows, columns
+        self._wave = wave_from(mobility_map, rows, columns)
+        self._places = self._goal_places(rows, columns)
+        self._goal_regions = set(mobility_map.possible_region[rows, columns].tolist()) - {0}
+
+    def all(self) -> list[StartResult]:
+        """Answer for the given starts, then for the random ones."""
+        places = [*self._spec.starts_m, *self.random_starts()]
+        return [self.reach(start, number) for number, start in enumerate(places)]
+
+    def random_starts(self) -> list[Point]:
+        """Draw the random starts."""
+        rng = stream(self._seed, "reach", "starts")
+        return [self._random_start(rng) for _ in range(self._spec.starts)]
+
+    def reach(self, start: Point, number: int = 0, effort: int = 1) -> StartResult:
+        """Find out whether the goal can be reached from a start.
+
+        Args:
+            start: Where the rover stands [m].
+            number: Which start it is; another one searches with another seed.
+            effort: How many times the budget of the planner is spent.
+        """
+        blocked = self._blocked(start)
+        if blocked:
+            return StartResult(start, "unreachable", blocked)
+        if self.map.mobility.turning == "point_turn":
+            return self._reach_by_straights(start, number, effort)
+        return self._reach_by_curves(start, number, effort)
+
+    def _goal_places(self, rows: Ints, columns: Ints) -> list[Point]:
+        """Give the place of the goal itself, if the rover can turn there, and the nearest nodes."""
+        spec, sure = self._spec, self.map.sure[rows, columns]
+        places = [spec.goal_m] if self.map.can_turn(spec.goal_m) else []
+        found: dict[int, Point] = {}
+        if spec.goal_radius_m > 0:
+            for row, column in zip(rows[sure], columns[sure], strict=True):
+                region = int(self.map.sure_region[row, column])
+                found.setdefault(region, self.map.point(row, column))
+        return places + list(found.values())
+
+    def _random_start(self, rng: np.random.Generator) -> Point:
+        """Draw one; where no place of the ring will do, the last draw stays and counts as it is."""
+        box, ring, goal = self._spec.box, self._spec.start_distances_m, self._spec.goal_m
+        start = goal
+        for _ in range(_DRAWS):
+            x, y = rng.uniform((box.x_min, box.y_min), (box.x_max, box.y_max)).tolist()
+            if ring is not None and not ring[0] <= math.dist((x, y), goal) <= ring[1]:
+                continue
+            start = (x, y)
+            if not self._spec.starts_stand or self.map.can_turn(start):
+                break
+        return start
+
+    def _blocked(self, start: Point) -> str:
+        """Say why even the inscribed disc cannot get to the goal; empty where it may."""
+        rows, columns = self._goal_nodes
+        if not self.map.possible[self.map.node(start)]:
+            return START_BLOCKED
+        if not self._goal_regions:
+            return GOAL_BLOCKED
+        if int(self.map.possible_region[self.map.node(start)]) in self._goal_regions:
+            return ""
+        joined = [
+            self._joins(self.map.possible_over(rocks=rocks, slope=slope), start, rows, columns)
+            for rocks, slope in ((True, False), (False, True))
+        ]
+        return {(False, True): ROCKS, (True, False): SLOPE}.get((joined[0], joined[1]), BOTH)
+
+    def _joins(self, free: Bools, start: Point, rows: Ints, columns: Ints) -> bool:
+        region = regions(free)
+        here = region[self.map.node(start)]
+        return bool(here > 0 and np.any(region[rows, columns] == here))
+
+    def _reach_by_straights(self, start: Point, number: int, effort: int) -> StartResult:
+        if not self.map.can_turn(start):
+            return StartResult(start, "undecided", TIGHT_START)
+        if not self._places:
+            return StartResult(start, "undecided", TIGHT_GOAL)
+        ways = {"map": self._over_map(start), "ompl": self._searched(start, number, effort)}
+        found = {name: way for name, way in ways.items() if way}
+        if not found:
+            return StartResult(start, "undecided", BUDGET)
+        name = min(found, key=lambda name: length_of(found[name]))
+        path = tuple((round(x, _DIGITS), round(y, _DIGITS)) for x, y in found[name])
+        return StartResult(start, "reachable", "", name, path, length_of(found[name]))
+
+    def _over_map(self, start: Point) -> list[Point]:
+        return self._wave.corners_from(start)
+
+    def _searched(self, start: Point, number: int, effort: int) -> list[Point]:
+        search = self._spec.search
+        for place in self._places:
+            seed = self._search_seed(number)
+            corners = search_straights(
+                self.map, start, place, effort * search.iterations, search.stride_m, seed
+            )
+            if corners:
+                return corners
+        return []
+
+    def _search_seed(self, number: int) -> int:
+        return int(stream(self._seed, "reach", "search", number).integers(1, 2**31))
+
+    def _reach_by_curves(self, start: Point, number: int, effort: int) -> StartResult:
+        rng = stream(self._seed, "reach", "heading", number)
+        begin = (*start, float(rng.uniform(-math.pi, math.pi)))
+        search = self._spec.search
+        seed = self._search_seed(number)
+        poses = search_curves(
+            self.map, begin, self._goal_poses(), effort * search.iterations, search.stride_m, seed
+        )
+        if not len(poses):
+            return StartResult(start, "undecided", BUDGET)
+        path = tuple(tuple(row) for row in np.round(poses, _DIGITS + 1).tolist())
+        length = float(np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1).sum())
+        return StartResult(start, "reachable", "", "ompl", path, length)
+
+    def _goal_poses(self) -> list[Pose]:
+        places = self._places or [self._spec.goal_m]
+        headings = 2 * np.pi * np.arange(_GOAL_HEADINGS) / _GOAL_HEADINGS
+        return [(*place, float(heading)) for place in places for heading in headings]
+
+
+def check_goal(results: tuple[TerrainResult, ...], spec: ReachSpec) -> None:
+    """Refuse a goal at which the rover can stand on no terrain of a study.
+
+    Raises:
+        BlockedPlaceError: It says where.
+    """
+    reasons = {start.reason for terrain in results for start in terrain.starts}
+    if reasons and reasons <= {GOAL_BLOCKED}:
+        raise BlockedPlaceError(
+            f"the goal ({spec.goal_m[0]:g}, {spec.goal_m[1]:g}) m lies in or too close to a rock, "
+            f"or on ground too steep, with no free place within goal_radius_m "
+            f"{spec.goal_radius_m:g}; move it, or raise goal_radius_m"
+        )
+
+
+__all__ = ["Outcome", "Reacher", "check_goal", "reach_from_all", "reach_on"]
