@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from lpet_sim.errors import BlockedPlaceError
 from lpet_sim.planning.clearance import Ground, Point
 from lpet_sim.planning.map_path import length_of, wave_from
 from lpet_sim.planning.mobility_map import Bools, MobilityMap, map_mobility, regions
+from lpet_sim.planning.path_measures import measure_path
 from lpet_sim.planning.reach_result import Outcome, StartResult, TerrainResult
 from lpet_sim.planning.reach_spec import Case, ReachSpec
 from lpet_sim.planning.search import Pose, search_curves, search_straights
@@ -44,9 +46,17 @@ def reach_on(case: Case, spec: ReachSpec) -> TerrainResult:
     """
     began_s = time.process_time()
     ground = build_terrain(case.terrain, case.seed)
-    starts = tuple(reach_from_all(ground, spec, case.seed))
+    found = reach_from_all(ground, spec, case.seed)
+    starts = tuple(_measured(start, ground, spec) for start in found)
     took_s = time.process_time() - began_s
     return TerrainResult(case.abundance, case.factor, case.index, case.seed, took_s, starts)
+
+
+def _measured(start: StartResult, ground: Ground, spec: ReachSpec) -> StartResult:
+    # A start at the goal itself has no way to speak of.
+    if len(start.path_m) < 2 or start.path_m[0][:2] == start.path_m[-1][:2]:
+        return start
+    return replace(start, measures=measure_path(start.path, ground, spec.mobility))
 
 
 def reach_from_all(ground: Ground, spec: ReachSpec, seed: int) -> list[StartResult]:

@@ -11,6 +11,8 @@ import numpy as np
 
 from lpet_sim.evaluation.statistics import Interval, pass_rate
 from lpet_sim.planning.clearance import Point
+from lpet_sim.planning.path_measures import PathMeasures
+from lpet_sim.planning.reach_spec import case_key
 from lpet_sim.recording.arrays import Array
 
 Outcome = Literal["reachable", "unreachable", "undecided"]
@@ -32,6 +34,7 @@ class StartResult:
         path_m: The way: corners (x, y) of straights with turns on the spot, or, with limited
             curvature, poses (x, y, heading) along it [m, rad].
         length_m: Length of the way [m]; 0 where there is none.
+        measures: What makes the way hard to drive; None where there is none.
     """
 
     start_m: Point
@@ -40,6 +43,7 @@ class StartResult:
     found_by: str = ""
     path_m: tuple[tuple[float, ...], ...] = ()
     length_m: float = 0.0
+    measures: PathMeasures | None = None
 
     @property
     def path(self) -> Array:
@@ -56,7 +60,10 @@ class StartResult:
     def from_mapping(cls, mapping: dict[str, Any]) -> Self:
         """Build it from what `to_mapping` gave."""
         path = tuple(tuple(row) for row in mapping["path_m"])
-        return cls(**(mapping | {"start_m": tuple(mapping["start_m"]), "path_m": path}))
+        known = mapping["measures"]
+        measures = None if known is None else PathMeasures(**known)
+        start = tuple(mapping["start_m"])
+        return cls(**(mapping | {"start_m": start, "path_m": path, "measures": measures}))
 
     def to_mapping(self) -> dict[str, Any]:
         """Give it as plain values; places to a tenth of a millimetre or better."""
@@ -82,6 +89,11 @@ class TerrainResult:
     seed: int
     cpu_s: float
     starts: tuple[StartResult, ...]
+
+    @property
+    def key(self) -> str:
+        """Name of the terrain's file, as of its case."""
+        return case_key(self.abundance, self.factor, self.index)
 
     @classmethod
     def from_mapping(cls, mapping: dict[str, Any]) -> Self:

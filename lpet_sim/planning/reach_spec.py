@@ -182,7 +182,13 @@ class Case:
     @property
     def key(self) -> str:
         """Name of the case's file."""
-        return f"k{self.abundance:g}_K{self.factor:g}_{self.index:04d}"
+        return case_key(self.abundance, self.factor, self.index)
+
+
+def case_key(abundance: float, factor: float, index: int) -> str:
+    """Give the name of a terrain's file from what it is among the terrains of a study."""
+    rocks = "own" if math.isnan(abundance) else f"k{abundance:g}"
+    return f"{rocks}_K{factor:g}_{index:04d}"
 
 
 def terrain_seed(seed: int, index: int) -> int:
