@@ -117,7 +117,7 @@ def prepare(path: Path, arm: ArmSpec, odometry: str) -> Scene:
     if truth is None:
         raise RecordingError(f"{path} holds no truth to score against; give one that does")
     if arm.sensor is not None:
-        sensed = sense_recording(recording, arm.sensor)
+        sensed = sense_recording(recording, arm.sensor, arm.seed)
         measurements = replace(measurements, sightings=sensed, images=None)
     if arm.declared is not None:
         measurements = miscalibrate(measurements, arm.declared)

@@ -13,7 +13,7 @@ from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec
 from lpet_sim.spec import Spec, read_yaml
 from lpet_sim.sweep.traverse import TraverseSpec, files_beside
 
-_ARM_KEYS = {"sensor", "declared"}
+_ARM_KEYS = {"sensor", "declared", "seed"}
 
 
 class DataSetsSpec(Spec):
@@ -46,10 +46,13 @@ class ArmSpec(Spec):
     Attributes:
         sensor: The landmark-level sensor; None takes the sightings that the recordings hold.
         declared: Errors of the declared calibration, put in afterwards; None: none.
+        seed: Seed of the sensor's landmarks and noise, so that arms can be draws of one sensor;
+            None: that of the traverse.
     """
 
     sensor: LandmarkSensorSpec | None = None
     declared: DeclaredErrorSpec | None = None
+    seed: int | None = None
 
 
 def _arm(value: object) -> object:

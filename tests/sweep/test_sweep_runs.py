@@ -268,23 +268,30 @@ def test_torn_lines_are_passed_over(tmp_path: Path) -> None:
 def test_the_command_drives_senses_and_sweeps(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Two drives in physics, sensed without images; called again it has nothing to do."""
+    """Two drives in physics, sensed without images in three draws; again there is nothing to do."""
     (tmp_path / "drive.yaml").write_text(TINY.replace("sensors: {stereo: null}", ""))
     mapping = small_sweep(
         tmp_path,
         data_sets={"traverse": "drive.yaml", "count": 2},
-        arms={"sensed": {"period_s": 0.5}},
+        arms={
+            "sensed": {"period_s": 0.5},
+            "same": {"sensor": {"period_s": 0.5}, "seed": 1},
+            "drawn": {"sensor": {"period_s": 0.5}, "seed": 77},
+        },
         variants=[{"estimator": "slam", "name": "slam"}],
     )
     spec = write_sweep(tmp_path / "sweep.yaml", mapping)
     lpet = runner(monkeypatch, capsys)
     first = lpet("sweep", spec, "--out", tmp_path / "out")
     assert first.code == 0
-    assert "ran 2 runs, 0 were there" in first.out
+    assert "ran 6 runs, 0 were there" in first.out
     rows, _ = read_table(tmp_path / "out" / "rows.parquet")
-    assert [(row["data_set"], row["seed"]) for row in rows] == [("tiny001", 1), ("tiny002", 2)]
+    assert [(row["data_set"], row["seed"]) for row in rows] == 3 * [("tiny001", 1), ("tiny002", 2)]
     assert all(row["failure"] == "" and row["images"] > 5 for row in rows)
-    assert "ran 0 runs, 2 were there" in lpet("sweep", spec, "--out", tmp_path / "out").out
+    ends = {(row["arm"], row["seed"]): row["end_error_m"] for row in rows}
+    assert ends["same", 1] == ends["sensed", 1] and ends["same", 2] != ends["sensed", 2]
+    assert len(set(ends.values())) == 5
+    assert "ran 0 runs, 6 were there" in lpet("sweep", spec, "--out", tmp_path / "out").out
     (tmp_path / "drive.yaml").write_text(TINY.replace("[0.3, 0]", "[0.4, 0]"))
     (tmp_path / "out" / "data_sets.json").unlink()
     other = lpet("sweep", spec, "--out", tmp_path / "out")
