@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from lpet_sim.cli_reach import reach
 from lpet_sim.cli_report import report
 from lpet_sim.cli_rig import rig_app
 from lpet_sim.cli_sweep import sweep
@@ -29,6 +30,7 @@ import_app = typer.Typer(
 )
 app.add_typer(import_app, name="import")
 app.add_typer(rig_app, name="rig")
+app.command()(reach)
 app.command()(report)
 app.command()(sweep)
 

@@ -9,20 +9,39 @@ from itertools import pairwise
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from lpet_sim.planning.clearance import Point
 from lpet_sim.planning.mobility_kernels import Floats, can_drive
 from lpet_sim.planning.mobility_map import MobilityMap
+from lpet_sim.planning.wave_kernels import SIDE, UNSEEN, find_bridges, follow, spread
 from lpet_sim.recording.arrays import Array, Ints
 
-Bools = NDArray[np.bool_]
-Costs = NDArray[np.int32]
+Numbers = NDArray[np.int32]
 
-# A step to the next node costs 12, a diagonal one 17: their ratio is within 0.2 % of sqrt(2).
-_SIDE, _DIAGONAL = 12, 17
-_BUCKETS = _DIAGONAL + 1
+_BRIDGE_M = 5.0
+_BRIDGES_MAX = 2_000_000
 _PULLS, _DENSE_M = 4, 0.5
-_UNSEEN = np.iinfo(np.int32).max
+
+
+@dataclass(frozen=True, eq=False)
+class Bridges:
+    """Straights that join the regions of `MobilityMap.sure` where the rover fits but cannot turn.
+
+    Attributes:
+        links: For each direction of each straight, the node that it leads to, and which one is next
+            from the same node, -1: none, Shape (b, 2).
+        prices: Cost of each, 12 for each cell of length, Shape (b,).
+        first: First one from each node, -1: none, Shape (ny * nx,).
+        joined: For each number of a region, the number of the group of regions that are joined,
+            Shape (regions + 1,); 0 stays 0.
+    """
+
+    links: Ints
+    prices: Numbers
+    first: Numbers
+    joined: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,55 +50,98 @@ class GoalWave:
 
     Attributes:
         mobility_map: The map.
-        cost: Cost of the way to the goal, 12 for each cell; the largest integer where there is
-            none, Shape (ny, nx).
+        cost: Cost of the way to the goal, 12 for each cell; `UNSEEN` where there is none,
+            Shape (ny * nx,).
+        toward: The next node on the way, Shape (ny * nx,).
     """
 
     mobility_map: MobilityMap
-    cost: Costs
+    cost: Numbers
+    toward: Numbers
 
     def reaches(self, start: Point) -> bool:
         """Tell whether a way leads from the node nearest to a start to the goal."""
-        return bool(self.cost[self.mobility_map.node(start)] < _UNSEEN)
+        return bool(self.cost[self._index(start)] < UNSEEN)
 
     def corners_from(self, start: Point) -> list[Point]:
         """Give a short way to the goal: straights between places to turn at, from the start on.
 
         Args:
-            start: A place from which the goal is reached, and where the rover can turn [m].
+            start: Where the rover stands [m].
 
         Returns:
             Corners [m]; the wave's way pulled taut wherever the rover can drive straight. Empty
-            where the start is too tight to set out from.
+            where the wave did not come, or the start is too tight to turn at.
         """
         here = self.mobility_map
         if not (self.reaches(start) and here.can_turn(start)):
             return []
-        nodes = np.empty((self.cost.size, 2), dtype=np.int64)
-        count = _descend(self.cost, *here.node(start), nodes)
-        xy = np.column_stack([here.x[nodes[:count, 1]], here.y[nodes[:count, 0]]])
+        nodes = np.empty(self.cost.size, dtype=np.int64)
+        nodes = nodes[: follow(self.toward, self.cost, self._index(start), nodes)]
+        rows, columns = np.divmod(nodes, len(here.x))
+        xy = np.column_stack([here.x[columns], here.y[rows]])
         if not here.can_drive(start, (float(xy[0, 0]), float(xy[0, 1]))):
             return []
         return shortened(here, pulled_taut(here, np.concatenate([[start], xy])))
 
+    def _index(self, xy: Point) -> int:
+        row, column = self.mobility_map.node(xy)
+        return row * len(self.mobility_map.x) + column
 
-def wave_from(mobility_map: MobilityMap, rows: Ints, columns: Ints) -> GoalWave:
-    """Spread a wave over `MobilityMap.sure` from the nodes that make up the goal.
+
+def bridges_of(mobility_map: MobilityMap) -> Bridges:
+    """Find the straights that join regions of `MobilityMap.sure` across narrow places."""
+    region, cell = mobility_map.sure_region, mobility_map.cell_m
+    ends = np.empty((_BRIDGES_MAX, 2), dtype=np.int64)
+    reach = int(_BRIDGE_M / cell)
+    ends = ends[: find_bridges(*mobility_map.layers, region, reach, ends)].copy()
+    columns = region.shape[1]
+    (from_row, to_row), (from_column, to_column) = ends.T // columns, ends.T % columns
+    away = np.hypot(to_row - from_row, to_column - from_column)
+    price = np.ceil(SIDE * away).astype(np.int32)
+    begins, leads = ends.T.ravel(), ends[:, ::-1].T.ravel()
+    first, after = _chained(begins, region.size)
+    links = np.column_stack([leads, after])
+    return Bridges(links, np.tile(price, 2), first, _groups(region.ravel(), ends))
+
+
+def _chained(begins: Ints, nodes: int) -> tuple[Numbers, Ints]:
+    """Chain what begins at the same node: the first of each node, and the next of each."""
+    order = np.argsort(begins, kind="stable")
+    same = begins[order][1:] == begins[order][:-1]
+    after = np.full(len(begins), -1, dtype=np.int64)
+    after[order[:-1][same]] = order[1:][same]
+    first = np.full(nodes, -1, dtype=np.int32)
+    leads = np.concatenate([[True], ~same])[: len(order)]
+    first[begins[order[leads]]] = order[leads]
+    return first, after
+
+
+def _groups(region: Numbers, ends: Ints) -> Ints:
+    count = int(region.max(initial=0)) + 1
+    a, b = region[ends[:, 0]], region[ends[:, 1]]
+    graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
+    label = np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    # No straight begins or ends off the regions, so number 0 is alone in its group.
+    return np.where(label == label[0], 0, label + 1)
+
+
+def wave_from(mobility_map: MobilityMap, bridges: Bridges, rows: Ints, columns: Ints) -> GoalWave:
+    """Spread a wave over `MobilityMap.sure` and the bridges from the nodes that make up the goal.
 
     Args:
         mobility_map: The map.
+        bridges: Of the map.
         rows: Of the goal's nodes; those off `sure` are left out, Shape (n,).
         columns: Of the goal's nodes, Shape (n,).
-
-    Reference:
-        Dial (1969), Algorithm 360: shortest-path forest with topological ordering.
     """
     free = mobility_map.sure
     on = free[rows, columns]
-    cost = np.full(free.shape, _UNSEEN, dtype=np.int32)
-    seeds = np.column_stack([rows[on], columns[on]]).astype(np.int64)
-    _spread(free, seeds, cost)
-    return GoalWave(mobility_map, cost)
+    cost = np.full(free.size, UNSEEN, dtype=np.int32)
+    toward = np.full(free.size, -1, dtype=np.int32)
+    seeds = (rows[on] * free.shape[1] + columns[on]).astype(np.int64)
+    spread(free, seeds, bridges.links, bridges.prices, bridges.first, cost, toward)
+    return GoalWave(mobility_map, cost, toward)
 
 
 def pulled_taut(mobility_map: MobilityMap, xy: Array) -> list[Point]:
@@ -126,67 +188,6 @@ def _between_corners(mobility_map: MobilityMap, corners: list[Point]) -> Array:
 def length_of(corners: list[Point]) -> float:
     """Give the length of a polyline [m]."""
     return float(sum(math.dist(a, b) for a, b in pairwise(corners)))
-
-
-@njit(cache=True)
-def _spread(free: Bools, seeds: Ints, cost: Costs) -> None:
-    """Settle nodes in the order of their costs, which a ring of buckets keeps."""
-    ny, nx = free.shape
-    room = 2 * free.size + len(seeds) + 64
-    held, behind = np.empty(room, np.int64), np.empty(room, np.int64)
-    head = np.full(_BUCKETS, -1, np.int64)
-    spare, used, waiting = -1, 0, 0
-    for k in range(len(seeds)):
-        cost[seeds[k, 0], seeds[k, 1]] = 0
-        held[used], behind[used] = seeds[k, 0] * nx + seeds[k, 1], head[0]
-        head[0] = used
-        used, waiting = used + 1, waiting + 1
-    now = 0
-    while waiting > 0:
-        slot = now % _BUCKETS
-        while head[slot] >= 0:
-            entry = head[slot]
-            head[slot], node = behind[entry], held[entry]
-            behind[entry], spare = spare, entry
-            waiting -= 1
-            i, j = node // nx, node % nx
-            if cost[i, j] != now:
-                continue
-            for di in range(-1, 2):
-                for dj in range(-1, 2):
-                    a, b = i + di, j + dj
-                    if a < 0 or b < 0 or a >= ny or b >= nx or not free[a, b]:
-                        continue
-                    then = now + (_DIAGONAL if di != 0 and dj != 0 else _SIDE)
-                    if then >= cost[a, b]:
-                        continue
-                    cost[a, b] = then
-                    entry = spare
-                    if entry >= 0:
-                        spare = behind[entry]
-                    else:
-                        entry, used = used, used + 1
-                    held[entry], behind[entry] = a * nx + b, head[then % _BUCKETS]
-                    head[then % _BUCKETS] = entry
-                    waiting += 1
-        now += 1
-
-
-@njit(cache=True)
-def _descend(cost: Costs, row: int, column: int, nodes: Ints) -> int:
-    """Go down the costs to the goal and write down the nodes passed."""
-    count, i, j = 0, row, column
-    while True:
-        nodes[count, 0], nodes[count, 1] = i, j
-        count += 1
-        if cost[i, j] == 0:
-            return count
-        best, to_i, to_j = cost[i, j], i, j
-        for a in range(max(i - 1, 0), min(i + 2, cost.shape[0])):
-            for b in range(max(j - 1, 0), min(j + 2, cost.shape[1])):
-                if cost[a, b] < best:
-                    best, to_i, to_j = cost[a, b], a, b
-        i, j = to_i, to_j
 
 
 @njit(cache=True)

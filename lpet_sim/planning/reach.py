@@ -10,7 +10,7 @@ import numpy as np
 
 from lpet_sim.errors import BlockedPlaceError
 from lpet_sim.planning.clearance import Ground, Point
-from lpet_sim.planning.map_path import length_of, wave_from
+from lpet_sim.planning.map_path import bridges_of, length_of, wave_from
 from lpet_sim.planning.mobility_map import Bools, MobilityMap, map_mobility, regions
 from lpet_sim.planning.path_measures import measure_path
 from lpet_sim.planning.reach_result import Outcome, StartResult, TerrainResult
@@ -84,7 +84,8 @@ class Reacher:
         self.map, self._spec, self._seed = mobility_map, spec, seed
         rows, columns = mobility_map.nodes_within(spec.goal_m, spec.goal_radius_m)
         self._goal_nodes = rows, columns
-        self._wave = wave_from(mobility_map, rows, columns)
+        self._bridges = bridges_of(mobility_map)
+        self._wave = wave_from(mobility_map, self._bridges, rows, columns)
         self._places = self._goal_places(rows, columns)
         self._goal_regions = set(mobility_map.possible_region[rows, columns].tolist()) - {0}
 
@@ -113,16 +114,21 @@ class Reacher:
             return self._reach_by_straights(start, number, effort)
         return self._reach_by_curves(start, number, effort)
 
-    def _goal_places(self, rows: Ints, columns: Ints) -> list[Point]:
-        """Give the place of the goal itself, if the rover can turn there, and the nearest nodes."""
-        spec, sure = self._spec, self.map.sure[rows, columns]
-        places = [spec.goal_m] if self.map.can_turn(spec.goal_m) else []
-        found: dict[int, Point] = {}
-        if spec.goal_radius_m > 0:
-            for row, column in zip(rows[sure], columns[sure], strict=True):
-                region = int(self.map.sure_region[row, column])
-                found.setdefault(region, self.map.point(row, column))
-        return places + list(found.values())
+    def _goal_places(self, rows: Ints, columns: Ints) -> dict[int, Point]:
+        """Give the goal's place nearest to its middle in each group of joined regions."""
+        groups = self._bridges.joined[self.map.sure_region[rows, columns]]
+        places: dict[int, Point] = {}
+        # The rover may be able to turn at the very place, though not at the node nearest to it.
+        if self.map.can_turn(self._spec.goal_m):
+            places[int(groups[0])] = self._spec.goal_m
+        if self._spec.goal_radius_m > 0:
+            for group, row, column in zip(groups, rows, columns, strict=True):
+                if group > 0:
+                    places.setdefault(int(group), self.map.point(row, column))
+        return places
+
+    def _group(self, xy: Point) -> int:
+        return int(self._bridges.joined[self.map.sure_region[self.map.node(xy)]])
 
     def _random_start(self, rng: np.random.Generator) -> Point:
         """Draw one; where no place of the ring will do, the last draw stays and counts as it is."""
@@ -162,7 +168,10 @@ class Reacher:
             return StartResult(start, "undecided", TIGHT_START)
         if not self._places:
             return StartResult(start, "undecided", TIGHT_GOAL)
-        ways = {"map": self._over_map(start), "ompl": self._searched(start, number, effort)}
+        ways = {
+            "map": self._wave.corners_from(start),
+            "ompl": self._searched(start, number, effort),
+        }
         found = {name: way for name, way in ways.items() if way}
         if not found:
             return StartResult(start, "undecided", BUDGET)
@@ -170,13 +179,11 @@ class Reacher:
         path = tuple((round(x, _DIGITS), round(y, _DIGITS)) for x, y in found[name])
         return StartResult(start, "reachable", "", name, path, length_of(found[name]))
 
-    def _over_map(self, start: Point) -> list[Point]:
-        return self._wave.corners_from(start)
-
     def _searched(self, start: Point, number: int, effort: int) -> list[Point]:
-        search = self._spec.search
-        for place in self._places:
-            seed = self._search_seed(number)
+        """Search for a way to the goal's place in the start's group; without one, to every one."""
+        search, group, seed = self._spec.search, self._group(start), self._search_seed(number)
+        joined = [self._places[group]] if group > 0 and group in self._places else []
+        for place in joined or self._places.values():
             corners = search_straights(
                 self.map, start, place, effort * search.iterations, search.stride_m, seed
             )
@@ -202,7 +209,7 @@ class Reacher:
         return StartResult(start, "reachable", "", "ompl", path, length)
 
     def _goal_poses(self) -> list[Pose]:
-        places = self._places or [self._spec.goal_m]
+        places = list(self._places.values()) or [self._spec.goal_m]
         headings = 2 * np.pi * np.arange(_GOAL_HEADINGS) / _GOAL_HEADINGS
         return [(*place, float(heading)) for place in places for heading in headings]
 
