@@ -33,6 +33,9 @@ class SiteSpec(Spec):
         speed_mps: Speed of the rover; 100 m/h (the paper).
         distance_m: Distance after which the error counts.
         standstill_s: The rover stands so long at the start, and learns the bias of its gyro.
+        slips_per_m: Times that the wheels slip so that the filter believes their step, and the
+            gyro's, to within its length only; one in 60 s at 100 m/h, as in the data sets of the
+            paper's experiment (a choice).
         ride_height_m: Height of the body's origin above flat ground; that of the ExoMars model.
         landmarks: Landmarks and front end of the default camera, of which a candidate changes the
             period, the noise, and the range with the focal length.
@@ -43,6 +46,7 @@ class SiteSpec(Spec):
     speed_mps: Positive = 100.0 / 3600.0
     distance_m: Annotated[float, Field(ge=2.0)] = 100.0
     standstill_s: NotNegative = 36.0
+    slips_per_m: NotNegative = 0.6
     ride_height_m: NotNegative = 0.3
     landmarks: LandmarkSensorSpec = LandmarkSensorSpec()
     wheels: WheelOdometrySpec = WheelOdometrySpec()

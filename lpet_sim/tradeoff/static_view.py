@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky
 
+from estimators.fused_odometry import FusedOdometrySpec
 from estimators.motion import MotionSpec
+from estimators.slam_spec import SlamSpec
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.calibration import StereoCalibration
@@ -140,7 +142,7 @@ class View:
         return max(1, round(reach_m / self._step_m()))
 
     def _odometry(self) -> tuple[Array, Array]:
-        """Give the variance of a step, Shape (6,), and its lasting errors, Shape (6, 4)."""
+        """Give the variances of the steps, Shape (k - 1, 6), and lasting errors, Shape (6, 4)."""
         site, imu = self._setting.site, imu_grade(self._candidate.imu).spec
         step_m, wheels = self._step_m(), site.wheels
         step_s = step_m / site.speed_mps
@@ -151,12 +153,28 @@ class View:
         lasting = np.zeros((_POSE, 4))
         lasting[0, 0] = wheels.declared_scale_sigma * step_m
         lasting[3:, 1:] = np.eye(3) * step_s * _bias_left(imu.gyro_bias_radps, walk, site)
-        return np.maximum(variance, _ODOMETRY_VARIANCE_MIN), lasting
+        return np.maximum(variance, _ODOMETRY_VARIANCE_MIN) + self._slipped(), lasting
+
+    def _slipped(self) -> Array:
+        """Give what slips, evenly along the path, add to the variances, Shape (k - 1, 6)."""
+        so_far = self._poses.translation[:, 0] * self._setting.site.slips_per_m
+        slips = np.diff(np.floor(so_far + 0.5))
+        least = SlamSpec()
+        moved_m = max(self._candidate.image_interval_m, least.slip_sigma_m)
+        sigma = np.repeat([moved_m, least.slip_sigma_rad], 3)
+        return slips[:, None] * sigma**2
 
 
 def _bias_left(bias_radps: float, walk: float, site: SiteSpec) -> float:
-    """Give the error of the gyro's bias after the standstill, 1 sigma [rad/s]."""
-    learnt = site.standstill_s / max(walk, 1e-12) ** 2
+    """Give the error of the gyro's bias after the standstill, 1 sigma [rad/s].
+
+    The standstill is taken in as the odometry takes it: in blocks, in each of which the parked
+    rover turns a little.
+    """
+    odometry = FusedOdometrySpec()
+    block_s = odometry.rest_block_s
+    turned = odometry.rest_turn_sigma_radps**2 + walk**2 / block_s
+    learnt = site.standstill_s / block_s / turned
     return 1.0 / math.sqrt(1.0 / max(bias_radps, 1e-12) ** 2 + learnt)
 
 
@@ -188,7 +206,6 @@ def camera_row(camera: StereoCalibration) -> Array:
 def _add_odometry(whole: Array, lasting: int, poses: SE3, variance: Array, by: Array) -> None:
     """Add the steps' information: ``xi_next - Ad(T_prev_curr^-1) xi_prev - U s`` of a variance."""
     back = (poses[:-1].inverse() @ poses[1:]).inverse().adjoint()
-    scale = 1.0 / np.sqrt(variance)
     for k in range(len(back)):
         row = np.zeros((_POSE, len(whole)))
         at = lasting + _POSE * k
@@ -197,7 +214,7 @@ def _add_odometry(whole: Array, lasting: int, poses: SE3, variance: Array, by: A
             row[:, at - _POSE : at] = -back[k]
         row[:, :lasting] = -by
         used = np.r_[0:lasting, max(lasting, at - _POSE) : at + _POSE]
-        row = row[:, used] * scale[:, None]
+        row = row[:, used] / np.sqrt(variance[k])[:, None]
         whole[np.ix_(used, used)] += row.T @ row
 
 
