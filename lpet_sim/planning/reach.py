@@ -86,8 +86,13 @@ class Reacher:
         self._goal_nodes = rows, columns
         self._bridges = bridges_of(mobility_map)
         self._wave = wave_from(mobility_map, self._bridges, rows, columns)
-        self._places = self._goal_places(rows, columns)
+        self._place_of = self._goal_places(rows, columns)
         self._goal_regions = set(mobility_map.possible_region[rows, columns].tolist()) - {0}
+
+    @property
+    def goal_places(self) -> list[Point]:
+        """One place to turn at within the goal for each group of joined regions [m]."""
+        return list(self._place_of.values())
 
     def all(self) -> list[StartResult]:
         """Answer for the given starts, then for the random ones."""
@@ -166,7 +171,7 @@ class Reacher:
     def _reach_by_straights(self, start: Point, number: int, effort: int) -> StartResult:
         if not self.map.can_turn(start):
             return StartResult(start, "undecided", TIGHT_START)
-        if not self._places:
+        if not self.goal_places:
             return StartResult(start, "undecided", TIGHT_GOAL)
         ways = {
             "map": self._wave.corners_from(start),
@@ -182,8 +187,8 @@ class Reacher:
     def _searched(self, start: Point, number: int, effort: int) -> list[Point]:
         """Search for a way to the goal's place in the start's group; without one, to every one."""
         search, group, seed = self._spec.search, self._group(start), self._search_seed(number)
-        joined = [self._places[group]] if group > 0 and group in self._places else []
-        for place in joined or self._places.values():
+        joined = [self._place_of[group]] if group > 0 and group in self._place_of else []
+        for place in joined or self.goal_places:
             corners = search_straights(
                 self.map, start, place, effort * search.iterations, search.stride_m, seed
             )
@@ -209,7 +214,7 @@ class Reacher:
         return StartResult(start, "reachable", "", "ompl", path, length)
 
     def _goal_poses(self) -> list[Pose]:
-        places = list(self._places.values()) or [self._spec.goal_m]
+        places = self.goal_places or [self._spec.goal_m]
         headings = 2 * np.pi * np.arange(_GOAL_HEADINGS) / _GOAL_HEADINGS
         return [(*place, float(heading)) for place in places for heading in headings]
 

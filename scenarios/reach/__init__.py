@@ -1,0 +1,1 @@
+"""Checks of goal reachability that share no code with the planner."""

@@ -1,0 +1,118 @@
+"""What a rover's body sweeps along a way, against the outlines of rocks: no map, no distances.
+
+Written apart from the planner, with other means: every centimetre of the way the body is set down
+as a rectangle, and each rock's polygon is tried for an axis that separates the two.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lpet_sim.planning.mobility import MobilitySpec
+from lpet_sim.terrain.rocks import Rocks
+
+Array = NDArray[np.float64]
+_STEP_M = 0.01
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A rectangle in the axes of the body [m]."""
+
+    x_min: float
+    x_max: float
+    y_min: float
+    y_max: float
+
+    @property
+    def corners(self) -> Array:
+        """Corners, Shape (4, 2)."""
+        x, y = (self.x_min, self.x_max), (self.y_min, self.y_max)
+        return np.array([(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])])
+
+
+def rectangles_of(spec: MobilitySpec) -> tuple[list[Rectangle], list[Rectangle]]:
+    """Give what obstacles, and what rocks between the wheels, must stay clear of."""
+    m = spec.margin_m
+    rear, front = -spec.rear_m - m, spec.front_m + m
+    outer, inner = spec.half_width_m + m, spec.half_width_m - spec.wheel_width_m - m
+    body = [Rectangle(rear, front, -outer, outer)]
+    return body, [Rectangle(rear, front, -outer, -inner), Rectangle(rear, front, inner, outer)]
+
+
+def poses_along(path: Array, reach_m: float) -> Array:
+    """Set the rover down every centimetre of a way; where it turns, every centimetre of its rim.
+
+    Args:
+        path: Corners of straights with turns on the spot, or poses along a curve, (n, 2) or (n, 3).
+        reach_m: Farthest point of the body from its origin [m].
+
+    Returns:
+        Poses (x, y, heading), Shape (n, 3).
+    """
+    if path.shape[1] == 3:
+        return _between(path, np.unwrap(path[:, 2]), reach_m)
+    step = np.diff(path, axis=0)
+    heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+    # Every corner twice: as the end of one side, and as the beginning of the next.
+    xy = np.repeat(path, 2, axis=0)[1:-1]
+    return _between(xy, np.repeat(heading, 2), reach_m)
+
+
+def _between(xy: Array, heading: Array, reach_m: float) -> Array:
+    rows = []
+    for k in range(len(xy) - 1):
+        moved = math.dist(xy[k, :2], xy[k + 1, :2]) + reach_m * abs(heading[k + 1] - heading[k])
+        share = np.linspace(0.0, 1.0, max(2, math.ceil(moved / _STEP_M) + 1))[:, None]
+        ends = np.array([[*xy[k, :2], heading[k]], [*xy[k + 1, :2], heading[k + 1]]])
+        rows.append(ends[0] + share * (ends[1] - ends[0]))
+    return np.concatenate(rows)
+
+
+def touched(path: Array, rocks: Rocks, spec: MobilitySpec) -> list[str]:
+    """Name the rocks that the rover touches with what it must not, along a way.
+
+    Args:
+        path: The way, Shape (n, 2) or (n, 3).
+        rocks: All rocks near it.
+        spec: What a rock is to the rover.
+    """
+    reach = math.hypot(max(spec.front_m, spec.rear_m) + spec.margin_m, spec.half_width_m + 1.0)
+    poses = poses_along(path, reach)
+    body, wheels = rectangles_of(spec)
+    found = []
+    for outline, centre, height, far in zip(
+        rocks.outlines(), rocks.p_world_rock, rocks.height_m, rocks.reach_m, strict=True
+    ):
+        if height <= spec.climb_height_m:
+            continue
+        # The whole width of a rock, however it lies, must fit between the wheels.
+        fits = height <= spec.belly_height_m and 2.0 * far <= spec.straddle_width_m
+        close = np.linalg.norm(poses[:, :2] - centre[:2], axis=1) <= reach + far
+        if close.any() and any(
+            _overlaps(poses[close], outline, one) for one in (wheels if fits else body)
+        ):
+            found.append(f"a rock {height:.2f} m high at ({centre[0]:.2f}, {centre[1]:.2f}) m")
+    return found
+
+
+def _overlaps(poses: Array, outline: Array, rectangle: Rectangle) -> bool:
+    """Tell whether a convex polygon overlaps the rectangle at any of the poses."""
+    cos, sin = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
+    off = outline[None] - poses[:, None, :2]
+    # The polygon in the axes of the body, Shape (poses, corners).
+    x, y = cos * off[..., 0] + sin * off[..., 1], cos * off[..., 1] - sin * off[..., 0]
+    apart = (x.max(1) <= rectangle.x_min) | (x.min(1) >= rectangle.x_max)
+    apart |= (y.max(1) <= rectangle.y_min) | (y.min(1) >= rectangle.y_max)
+    for k in range(len(outline)):
+        after = (k + 1) % len(outline)
+        # The outward normal of a side of a polygon that runs counter-clockwise.
+        nx, ny = (y[:, after] - y[:, k])[:, None], (x[:, k] - x[:, after])[:, None]
+        limit = nx[:, 0] * x[:, k] + ny[:, 0] * y[:, k]
+        nearest = (nx * rectangle.corners[:, 0] + ny * rectangle.corners[:, 1]).min(axis=1)
+        apart |= nearest >= limit
+    return bool(np.any(~apart))
