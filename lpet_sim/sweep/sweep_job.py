@@ -16,9 +16,12 @@ from estimators.odometry_steps import image_odometry
 from lpet_sim.errors import LpetError, RecordingError
 from lpet_sim.evaluation.bounds import end_bound
 from lpet_sim.recording.reader import read_recording
+from lpet_sim.recording.recording import Recording
 from lpet_sim.recording.streams import Measurements
+from lpet_sim.rng import stream
+from lpet_sim.sweep.carried import Carrier
 from lpet_sim.sweep.miscalibration import miscalibrate
-from lpet_sim.sweep.sensing import sense_recording
+from lpet_sim.sweep.sensing import sense_recording, terrain_of
 from lpet_sim.sweep.sweep_once import PlannedRun, RunSettings, Scene, run_row, said, worker_name
 from lpet_sim.sweep.sweep_plan import code_digest
 from lpet_sim.sweep.sweep_spec import ArmSpec
@@ -116,14 +119,25 @@ def prepare(path: Path, arm: ArmSpec, odometry: str) -> Scene:
     measurements, truth = recording.measurements, recording.truth
     if truth is None:
         raise RecordingError(f"{path} holds no truth to score against; give one that does")
-    if arm.sensor is not None:
-        sensed = sense_recording(recording, arm.sensor, arm.seed)
+    if arm.sensor is not None and arm.sensors is not None:
+        carrier = Carrier.of(recording, terrain_of(recording.manifest))
+        measurements = carrier.carry(arm.sensors, arm.sensor, _drawn(recording, arm))
+    elif arm.sensor is not None:
+        sensed = sense_recording(recording, arm.sensor, _drawn(recording, arm))
         measurements = replace(measurements, sightings=sensed, images=None)
     if arm.declared is not None:
         measurements = miscalibrate(measurements, arm.declared)
     measurements = _with_odometry(measurements, odometry)
     seen = measurements.sightings or measurements.images
     return Scene(measurements, truth, 0 if seen is None else len(seen))
+
+
+def _drawn(recording: Recording, arm: ArmSpec) -> int:
+    """Give the seed of what an arm draws."""
+    own = recording.manifest.seed or 0
+    if arm.draw == 0:
+        return own
+    return int(stream(own, "sweep", "draw", arm.draw).integers(1, 2**31))
 
 
 def _with_odometry(measurements: Measurements, kind: str) -> Measurements:

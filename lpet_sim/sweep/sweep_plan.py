@@ -34,6 +34,9 @@ _RUN_CODE = (
 _SENSING_CODE = (
     "lpet_sim/terrain/*.py",
     "lpet_sim/sensors/landmark*.py",
+    "lpet_sim/sensors/i[mn]*.py",
+    "lpet_sim/sensors/wheels.py",
+    "lpet_sim/sweep/carried.py",
     "lpet_sim/sweep/sensing.py",
 )
 

@@ -10,10 +10,11 @@ from pydantic import BeforeValidator, Field, model_validator
 from lpet_sim.evaluation import EvaluationSpec, Requirement
 from lpet_sim.sensors.camera_spec import DeclaredErrorSpec
 from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec
+from lpet_sim.sensors.suite import SensorSuiteSpec
 from lpet_sim.spec import Spec, read_yaml
 from lpet_sim.sweep.traverse import TraverseSpec, files_beside
 
-_ARM_KEYS = {"sensor", "declared", "seed"}
+_ARM_KEYS = {"sensor", "declared", "sensors", "draw"}
 
 
 class DataSetsSpec(Spec):
@@ -45,14 +46,25 @@ class ArmSpec(Spec):
 
     Attributes:
         sensor: The landmark-level sensor; None takes the sightings that the recordings hold.
+        sensors: Camera, inertial unit and wheels that a simulated drive is to carry in place of its
+            own, as a traverse's ``sensors``; all are drawn anew. Needs a ``sensor``. None: its own.
         declared: Errors of the declared calibration, put in afterwards; None: none.
-        seed: Seed of the sensor's landmarks and noise, so that arms can be draws of one sensor;
-            None: that of the traverse.
+        draw: Which draw of landmarks and noise, so that arms can be draws of one sensor; 0: that of
+            the traverse's seed.
     """
 
     sensor: LandmarkSensorSpec | None = None
+    sensors: SensorSuiteSpec | None = None
     declared: DeclaredErrorSpec | None = None
-    seed: int | None = None
+    draw: Annotated[int, Field(ge=0)] = 0
+
+    @model_validator(mode="after")
+    def _sees(self) -> Self:
+        if self.sensors is not None and self.sensor is None:
+            raise ValueError(
+                "sensors need a sensor: the landmark sensor that stands for the camera"
+            )
+        return self
 
 
 def _arm(value: object) -> object:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -10,12 +9,13 @@ from pathlib import Path
 from estimators.odometry_steps import image_odometry
 from lpet_sim.errors import LpetError
 from lpet_sim.recording.reader import read_recording
+from lpet_sim.sweep.carried import Carrier
 from lpet_sim.sweep.sensing import terrain_of
 from lpet_sim.sweep.sweep_job import bound_of
 from lpet_sim.sweep.sweep_once import PlannedRun, RunSettings, Scene, run_row, said
 from lpet_sim.sweep.sweep_store import Journal, RowStore
 from lpet_sim.tradeoff.candidate import Candidate
-from lpet_sim.tradeoff.carried import Carrier
+from lpet_sim.tradeoff.kept_terrain import KeptTerrain
 from lpet_sim.tradeoff.recommend import suite_of
 from lpet_sim.tradeoff.spec import SiteSpec
 
@@ -43,15 +43,6 @@ class Drive:
     runs: tuple[PlannedRun, ...]
     settings: RunSettings
     bound: bool = False
-
-
-@lru_cache(maxsize=1)
-def carrying_code() -> str:
-    """Name the code that decides what a carried sensor measures."""
-    here = Path(__file__).parent
-    sensors = (here.parent / "sensors" / name for name in ("imu.py", "wheels.py", "increments.py"))
-    files = [here / "carried.py", *sensors]
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
 
 
 def missing_runs(drive: Drive, store: RowStore) -> list[PlannedRun]:
@@ -109,4 +100,5 @@ def carried_scene(path: Path, candidate: Candidate, site: SiteSpec, draw: int) -
 @lru_cache(maxsize=2)
 def _carrier(path: Path) -> Carrier:
     recording = read_recording(path)
-    return Carrier.of(recording, terrain_of(recording.manifest))
+    terrain, seed = terrain_of(recording.manifest), recording.manifest.seed or 0
+    return Carrier.of(recording, KeptTerrain(terrain.spec, seed))

@@ -22,7 +22,7 @@ from lpet_sim.sweep.sweep_pool import Pool
 from lpet_sim.sweep.sweep_spec import DataSetsSpec
 from lpet_sim.sweep.sweep_store import Redo, Row, RowStore
 from lpet_sim.tradeoff.candidate import Candidate
-from lpet_sim.tradeoff.drives import Drive, carrying_code, missing_runs, run_drive
+from lpet_sim.tradeoff.drives import Drive, missing_runs, run_drive
 from lpet_sim.tradeoff.recommend import Efficiency, suite_of
 from lpet_sim.tradeoff.spec import SimulationSpec, TradeoffSpec
 from lpet_sim.tradeoff.static import predict, setting_of
@@ -162,9 +162,9 @@ def _plan(
     bounds: bool,
 ) -> Iterator[_Planned]:
     assert spec.simulation is not None
-    for index, candidate in candidates.items():
+    for draw in range(seed, seed + spec.simulation.draws):
         for data_set in data_sets:
-            for draw in range(seed, seed + spec.simulation.draws):
+            for index, candidate in candidates.items():
                 key = _key(candidate, spec, data_set, draw, settings)
                 runs = tuple(
                     PlannedRun(digest([key, v.estimator, v.spec]), v.estimator, v.spec)
@@ -181,7 +181,7 @@ def _key(
     site = spec.site
     sensed = candidate.landmark_sensor(site.landmarks, site.speed_mps).to_mapping()
     held = [suite_of(candidate, site).to_mapping(), sensed, spec.requirement.to_mapping()]
-    return digest([data_set.digest, draw, settings.code, carrying_code(), *held])
+    return digest([data_set.digest, draw, settings.code, *held])
 
 
 def _runs(planned: _Planned) -> Iterator[tuple[PlannedRun, Variant]]:
