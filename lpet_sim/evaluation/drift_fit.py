@@ -38,6 +38,8 @@ _WIDE: Final = (1.0, 1.0)
 _LEAST_PX2: Final = 1e-9
 _STEP: Final = 0.02
 _STEP_MIN_PX2: Final = 1e-6
+_LOG_LEAST: Final = -40.0
+_HALVINGS: Final = 30
 _RESAMPLES: Final = 1000
 _NEAR: Final = 0.2
 
@@ -59,6 +61,9 @@ class DriftFit:
         square: Mean normalised square, cut off at the gate, over its expectation, at white noise
             and `drift_px`, Shape (k,); 1 where they explain it.
         median: Median over its expectation, at white noise and `drift_median_px`, Shape (k,).
+        by_mean_px: White noise alone that would give the pairs their mean cut square, Shape (k,);
+            it grows with the images between where tracks slide.
+        by_median_px: The same of their median square, Shape (k,).
         beyond: Share beyond the gate at `drift_px`, Shape (k,); 0.001 for Gaussian walks.
     """
 
@@ -73,6 +78,8 @@ class DriftFit:
     walked_m: Array
     square: Array
     median: Array
+    by_mean_px: Array
+    by_median_px: Array
     beyond: Array
 
     @property
@@ -107,6 +114,7 @@ def fit_drift(
         counts = _counts(known, lags)
         theta = _solved(known, lags, theta)
     off = pairs.distance2(theta[0], theta[1])[pairs.lag == lags[0]] >= WRONG
+    bare = known.distance2(1.0, 0.0)
     white, mean, middle = _intervals(known, lags, theta, seed)
     return DriftFit(
         sigma_px=white,
@@ -120,6 +128,8 @@ def fit_drift(
         walked_m=np.array([known.walked_m[known.lag == lag].mean() for lag in lags]),
         square=_squares(known, lags, theta),
         median=_medians(known, lags, theta),
+        by_mean_px=np.array([_white_by_mean_px(bare[known.lag == lag]) for lag in lags]),
+        by_median_px=np.array([_white_by_median_px(bare[known.lag == lag]) for lag in lags]),
         beyond=_by_lag(known, lags, known.distance2(theta[0], theta[1]) >= GATE),
     )
 
@@ -150,6 +160,25 @@ def _medians(pairs: Pairs, lags: tuple[int, ...], theta: Array) -> Array:
     """Give median squares over what they ought to be, Shape (k,)."""
     far = pairs.distance2(theta[0], theta[2])
     return np.array([np.median(far[pairs.lag == lag]) for lag in lags]) / MEDIAN
+
+
+def _white_by_mean_px(square_px2: Array) -> float:
+    """Give the white noise at which the mean of cut squares is what it ought to be [px]."""
+    low = high = float(np.log(np.median(square_px2) + _LEAST_PX2))
+    while np.minimum(square_px2 / np.exp(low), GATE).mean() < MEAN_CUT and low > _LOG_LEAST:
+        low -= 1.0
+    while np.minimum(square_px2 / np.exp(high), GATE).mean() > MEAN_CUT:
+        high += 1.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        larger = np.minimum(square_px2 / np.exp(middle), GATE).mean() > MEAN_CUT
+        low, high = (middle, high) if larger else (low, middle)
+    return float(np.exp(0.5 * high))
+
+
+def _white_by_median_px(square_px2: Array) -> float:
+    """Give the white noise at which the median is what it ought to be [px]."""
+    return float(np.sqrt(np.median(square_px2) / MEDIAN))
 
 
 def _logs(pairs: Pairs, lags: tuple[int, ...], theta: Array) -> Array:

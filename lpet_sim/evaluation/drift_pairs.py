@@ -21,11 +21,12 @@ _FLAT = 1e-6
 class Pairs:
     """What sightings and those taken over from an earlier image differ by.
 
-    Of a pair (a, b) of one landmark's sightings, of white noise s and a walk of variance
-    ``q^2 d`` in the image f that showed it first, the residual ``r = z_b - transfer(z_a)`` has the
-    covariance ``s^2 A + q^2 B``, ``A = I + G_ba G_ba'``, ``B = d G_bf G_bf'``, G the derivatives of
-    what one image sees by what another does. With ``V' A V = I`` and ``V' B V = diag(ratio)`` the
-    normalised square of r is ``sum (V' r)^2 / (s^2 + q^2 ratio)``.
+    Of a pair (a, b) of one landmark's sightings, of white noise s and a walk of variance ``q^2 d``
+    over the distance d, the residual ``r = z_b - transfer(z_a)`` has the covariance
+    ``s^2 A + q^2 B``: ``A = I + G_ba G_ba'``, G the derivatives of what one image sees by what
+    another does, and ``B = d/6 (G_ba G_ba' + 4 G_bm G_bm' + I)``, by Simpson's rule over the poses
+    between, m half-way. With ``V' A V = I`` and ``V' B V = diag(ratio)`` the normalised square of r
+    is ``sum (V' r)^2 / (s^2 + q^2 ratio)``.
 
     Attributes:
         lag: Images between, of each pair, Shape (m,).
@@ -54,20 +55,17 @@ class Pairs:
             lags: How many images the sightings of a pair are apart.
         """
         a, b = _apart(tracks, lags)
-        first = tracks.starts[tracks.track[a]]
         T = path.T_camera_world.inverse()
-        T_a, T_b, T_first = (T[tracks.image[rows]] for rows in (a, b, first))
-        there, G_ba, ahead = transfer(stereo, T_a.inverse() @ T_b, tracks.stereo_px[a])
-        _, G_fa, known = transfer(stereo, T_a.inverse() @ T_first, tracks.stereo_px[a])
-        use = np.flatnonzero(ahead & known & (np.abs(np.linalg.det(G_fa)) > _FLAT))
-        a, b, G_ba, G_fa = a[use], b[use], G_ba[use], G_fa[use]
+        T_a_b = T[tracks.image[a]].inverse() @ T[tracks.image[b]]
+        there, G, ahead = transfer(stereo, T_a_b, tracks.stereo_px[a])
+        _, G_ma, between = transfer(stereo, SE3.exp(0.5 * T_a_b.log()), tracks.stereo_px[a])
+        use = np.flatnonzero(ahead & between & (np.abs(np.linalg.det(G_ma)) > _FLAT))
+        a, b, G, G_bm = a[use], b[use], G[use], G[use] @ np.linalg.inv(G_ma[use])
         so_far_m = driven_m(path, stereo)[tracks.image]
-        walked_m, G_bf = so_far_m[b] - so_far_m[a], G_ba @ np.linalg.inv(G_fa)
-        square, ratio = _diagonal(
-            tracks.stereo_px[b] - there[use],
-            np.eye(3) + G_ba @ np.swapaxes(G_ba, 1, 2),
-            walked_m[:, None, None] * (G_bf @ np.swapaxes(G_bf, 1, 2)),
-        )
+        walked_m, far = so_far_m[b] - so_far_m[a], G @ np.swapaxes(G, 1, 2)
+        mean = (far + 4.0 * G_bm @ np.swapaxes(G_bm, 1, 2) + np.eye(3)) / 6.0
+        residual, walk = tracks.stereo_px[b] - there[use], walked_m[:, None, None] * mean
+        square, ratio = _diagonal(residual, np.eye(3) + far, walk)
         return cls(tracks.image[b] - tracks.image[a], tracks.track[a], square, ratio, walked_m)
 
     def __len__(self) -> int:
@@ -133,8 +131,8 @@ def driven_m(path: CameraPath, stereo: StereoCalibration) -> Array:
 
 
 def _diagonal(residual: Array, white: Array, walk: Array) -> tuple[Array, Array]:
-    """Give squares and ratios that belong to both covariances' common axes, Shape (m, 3) each."""
+    """Give squares and ratios along both covariances' common axes, Shape (m, 3) each."""
     back = np.linalg.inv(np.linalg.cholesky(white))
     ratio, U = np.linalg.eigh(back @ walk @ np.swapaxes(back, 1, 2))
-    along = np.einsum("mji,mjk,mk->mi", U, back, residual)
+    along = np.einsum("mji,mj->mi", U, (back @ residual[..., None])[..., 0])
     return along**2, np.maximum(ratio, 0.0)

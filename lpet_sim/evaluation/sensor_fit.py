@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
+from lpet_sim.errors import RecordingError
+from lpet_sim.evaluation.drift_fit import DriftFit, fit_drift
 from lpet_sim.evaluation.equivalent_noise import equivalent_sigma_px
 from lpet_sim.evaluation.noise_fit import fit_noise
-from lpet_sim.evaluation.noise_model import NoiseFit
+from lpet_sim.evaluation.noise_model import NoiseFit, corrected
 from lpet_sim.evaluation.sighting_tracks import CameraPath, Tracks
 from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.calibration import StereoCalibration
@@ -107,6 +109,9 @@ class SensorFit:
             rotation of the camera against its mounting [rad], Shape (6,).
         shared_se: Their standard errors, Shape (6,).
         settled: Whether each image's common motion was taken out of the noise.
+        drift: How far tracks slide; None where the truth is itself measured, for then its own error
+            grows with the distance, and where landmarks are seen too seldom to tell.
+        declared_drift_px: What the stream declares of it, mean over images [px/sqrt(m)].
         residual_px: Noise of each sighting that can tell [px], Shape (m, 3), for histograms.
         p_world: Places of the landmarks in order of their ids [m], Shape (k, 3).
     """
@@ -116,6 +121,8 @@ class SensorFit:
     shared: Array
     shared_se: Array
     settled: bool
+    drift: DriftFit | None
+    declared_drift_px: float
     residual_px: Array
     p_world: Array
 
@@ -145,7 +152,21 @@ def fit_sensor(
     noise = _noise_figures(fit, tracks, calibration)
     shown = _track_figures(fit, tracks, sightings, calibration)
     _, p_world = places(fit, tracks, calibration)
-    return SensorFit(noise, shown, fit.shared, fit.shared_se, settle, px[use], p_world)
+    drift = None if settle else _drift(fit, tracks, calibration)
+    slides = settle, drift, float(np.mean(sightings.drift_px))
+    return SensorFit(noise, shown, fit.shared, fit.shared_se, *slides, px[use], p_world)
+
+
+def _drift(fit: NoiseFit, tracks: Tracks, calibration: StereoCalibration) -> DriftFit | None:
+    """Measure how far tracks slide once the errors that all share are taken out."""
+    (focal_px, baseline_m, _, _), path = corrected(fit.shared, calibration, fit.path)
+    true = {"focal_px": float(focal_px), "baseline_m": float(baseline_m)}
+    px = tracks.stereo_px + np.array([0.0, fit.shared[0], 0.0])
+    try:
+        stereo = calibration.model_copy(update=true)
+        return fit_drift(replace(tracks, stereo_px=px), path, stereo)
+    except RecordingError:
+        return None
 
 
 def _noise_figures(fit: NoiseFit, tracks: Tracks, calibration: StereoCalibration) -> NoiseFigures:

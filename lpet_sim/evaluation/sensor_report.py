@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from lpet_sim.evaluation.sensor_fit import LAGS, RANGE_SHARES, SensorFit
+from lpet_sim.evaluation.statistics import Interval
 from lpet_sim.recording.arrays import Array
 
 _NAMES = ("u_left", "u_right", "v")
@@ -52,6 +53,7 @@ def _rows(fit: SensorFit) -> dict[str, str]:
         "disparity bias [px]": f"{shared[0]:+.4f} +- {error[0]:.4f}",
         "focal length, declared over true [%]": f"{100 * shared[1]:+.3f} +- {100 * error[1]:.3f}",
         "baseline, declared over true [%]": f"{100 * shared[2]:+.3f} +- {100 * error[2]:.3f}",
+        **_drift_rows(fit),
         "impossible sightings [%]": f"{100 * tracks.impossible:.2f}",
         "seen again in the next image [%]": f"{100 * tracks.seen_next:.1f}",
         "seen between first and last sighting [%]": f"{100 * tracks.seen_between:.1f}",
@@ -61,6 +63,41 @@ def _rows(fit: SensorFit) -> dict[str, str]:
         "range, quartiles [m]": _triple(tracks.range_m[2:5], 1),
         "range, 1 and 99 % [m]": f"{tracks.range_m[0]:.1f}, {tracks.range_m[-1]:.1f}",
     }
+
+
+def _drift_rows(fit: SensorFit) -> dict[str, str]:
+    """Lay out how tracks slide; without it where the truth is measured too."""
+    drift = fit.drift
+    names = (
+        "how far tracks slide, with 95 % [px/sqrt(m)]",
+        "  by medians",
+        "  root mean square and spread of landmarks",
+        "  declared",
+        "  white noise beside it [px]",
+        "  wrong names [%]",
+    )
+    if drift is None:
+        why = "the truth is measured too" if fit.settled else "too few sightings"
+        return {names[0]: f"not known: {why}", names[3]: f"{fit.declared_drift_px:.3f}"}
+    apart = f"{', '.join(str(lag) for lag in drift.lag)} images apart [px]"
+    values = (
+        f"{_between(drift.drift_px)}, over {drift.distance_m:.1f} m",
+        _between(drift.drift_median_px),
+        f"{drift.spread.drift_px:.3f}, {drift.spread.spread:.2f}",
+        f"{fit.declared_drift_px:.3f}",
+        _between(drift.sigma_px),
+        f"{100 * drift.wrong:.2f}",
+    )
+    return dict(zip(names, values, strict=True)) | {
+        f"differ {apart}": _triple(drift.by_mean_px),
+        "  by medians [px]": _triple(drift.by_median_px),
+        "  mean squares over those expected": _triple(drift.square, 2),
+        "  beyond the gate [%]": _triple(100 * drift.beyond, 1),
+    }
+
+
+def _between(interval: Interval) -> str:
+    return f"{interval.value:.3f} ({interval.low:.3f} to {interval.high:.3f})"
 
 
 def _triple(values: Array, digits: int = 3) -> str:

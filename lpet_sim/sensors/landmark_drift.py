@@ -1,9 +1,10 @@
-"""Tracks that slide: what stands for a landmark walks in the image that showed it first.
+"""Tracks that slide: what stands for a landmark walks in the images with the distance driven.
 
 What a front end follows is not always a point of the world: the edge of a rock against the ground
-behind it, a patch that looks different from a new side. Here the sighting ``z`` that stands for a
-landmark walks with the distance driven, in the image that showed the landmark first, and each image
-shows the place that it then stands for. The walk goes on while the landmark is not seen.
+behind it, a patch that looks different from a new side. Here each image sees what stands for a
+landmark a step away from where the image before saw it. A step on a far rock is a long way in the
+world; steps are alike in the images that show them, as those of rendered images are, however far
+off the landmark was when it was first seen.
 """
 
 from __future__ import annotations
@@ -31,37 +32,32 @@ def slide(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Show landmarks where they have walked to.
 
-    ``x = z_first + walk`` stands for the point ``P / w``, ``P = b (u_left - cx, v - cy, f)`` and
-    ``w = u_left - u_right``; the camera at ``T_first_now = (R, t)`` sees ``R' P - R' t w`` with the
-    same w.
+    From one showing to the next a sighting x goes where the point stands that it stands for, and
+    then on by the step of its walk. That point is ``P / w``, ``P = b (u_left - cx, v - cy, f)`` and
+    ``w = u_left - u_right``; a camera at ``T_before_now = (R, t)`` sees ``R' P - R' t w`` with the
+    same w, so that points beyond infinity, where w is negative, are as good as others.
 
     Args:
         stereo_px: True (u_left, u_right, v) of each showing [px], Shape (m, 3).
         landmark_id: Whose showing it is, Shape (m,).
         image: In which image, in order, Shape (m,).
         T_world_camera: True poses of the left eye in the images, Shape (n,).
-        walk: How far each has walked in its first image [px], Shape (m, 3).
+        walk: Sum of each landmark's steps so far [px], Shape (m, 3).
         camera: The pair as it truly is.
 
     Returns:
         Where each is seen [px], Shape (m, 3), and which of them is still in both images, (m,).
     """
-    first = _first_rows(landmark_id)
-    T_first_now = T_world_camera[image[first]].inverse() @ T_world_camera[image]
-    x = stereo_px[first] + walk
-    P = np.stack([x[:, 0] - camera.cx_px, x[:, 2] - camera.cy_px], axis=1)
-    P = camera.baseline_m * np.column_stack([P, np.full(len(x), camera.focal_px)])
-    w = x[:, 0] - x[:, 1]
-    turned = P - T_first_now.translation * w[:, None]
-    X, Y, Z = np.einsum("mij,mi->jm", T_first_now.rotation, turned)
-    # The depth is Z / w; beyond infinity, where w is negative, all that is ahead has Z above zero.
-    ahead = np.maximum(_NEAREST_M * w, 0.0) < Z
-    Z = np.where(ahead, Z, 1.0)
-    left = camera.focal_px * X / Z + camera.cx_px
-    right = left - camera.focal_px * camera.baseline_m * w / Z
-    out = np.stack([left, right, camera.focal_px * Y / Z + camera.cy_px], axis=1)
+    order = np.lexsort((image, landmark_id))
+    pinhole = np.array([camera.focal_px, camera.cx_px, camera.cy_px, camera.baseline_m])
+    rows, ahead = np.empty_like(stereo_px), np.empty(len(order), np.bool_)
+    R, p = np.array(T_world_camera.rotation), np.array(T_world_camera.translation)
+    sorted_by_name = landmark_id[order], image[order], stereo_px[order], walk[order]
+    _slide(*sorted_by_name, R, p, pinhole, rows, ahead)
+    out, seen = np.empty_like(rows), np.empty_like(ahead)
+    out[order], seen[order] = rows, ahead
     limit = np.array([camera.width_px, camera.width_px, camera.height_px]) - 1.0
-    return out, np.asarray(ahead & np.all((out >= 0.0) & (out <= limit), axis=1))
+    return out, np.asarray(seen & np.all((out >= 0.0) & (out <= limit), axis=1))
 
 
 def walks(landmark_id: Ints, image: Ints, t_ns: Ints, distance_m: Array, key: int) -> Array:
@@ -104,10 +100,38 @@ def sizes(landmark_id: Ints, spread: float, key: int) -> Array:
     return np.asarray(np.exp(spread * out - spread**2))
 
 
-def _first_rows(landmark_id: Ints) -> Ints:
-    """Give the row of each landmark's first showing, Shape (m,)."""
-    _, first, which = np.unique(landmark_id, return_index=True, return_inverse=True)
-    return np.asarray(first[which])
+@njit(cache=True, nogil=True)
+def _transfer(x, R_a, p_a, R_b, p_b, camera):  # type: ignore[no-untyped-def]
+    """Move a sighting from camera a to b, and tell whether its point is ahead of b."""
+    f, cx, cy, b = camera
+    w = x[0] - x[1]
+    seen, P = (b * (x[0] - cx), b * (x[2] - cy), b * f), (p_a - p_b) * w
+    for i in range(3):
+        for j in range(3):
+            P[i] += R_a[i, j] * seen[j]
+    X = R_b[0, 0] * P[0] + R_b[1, 0] * P[1] + R_b[2, 0] * P[2]
+    Y = R_b[0, 1] * P[0] + R_b[1, 1] * P[1] + R_b[2, 1] * P[2]
+    Z = R_b[0, 2] * P[0] + R_b[1, 2] * P[1] + R_b[2, 2] * P[2]
+    if max(_NEAREST_M * w, 0.0) >= Z:
+        return False
+    x[0] = f * X / Z + cx
+    x[1] = x[0] - f * b * w / Z
+    x[2] = f * Y / Z + cy
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _slide(identity, image, stereo_px, walk, R, p, camera, out, ahead):  # type: ignore[no-untyped-def]
+    """Slide landmarks, rows sorted by landmark and image; one behind the camera is lost."""
+    x, lives = np.empty(3), True
+    for row in range(len(identity)):
+        before, now = image[row - 1], image[row]
+        if row == 0 or identity[row] != identity[row - 1]:
+            x[:], lives = stereo_px[row], True
+        elif lives:
+            lives = _transfer(x, R[before], p[before], R[now], p[now], camera)
+            x += walk[row] - walk[row - 1]
+        out[row], ahead[row] = x, lives
 
 
 @njit(cache=True, nogil=True)

@@ -121,9 +121,33 @@ def draw_sightings(key: int, t_ns: Ints, identity: Ints) -> tuple[Array, Array]:
         identity: Names of the landmarks, Shape (n,).
 
     Returns:
-        Numbers uniform in [0, 1) for detection, misclassification and its order, Shape (n, 3), and
-        standard normal ones for u_left, u_right and v, Shape (n, 3).
+        Numbers uniform in [0, 1) for detection, misclassification, its order and loss, Shape
+        (n, 4), and standard normal ones for u_left, u_right and v, Shape (n, 3).
     """
-    uniforms, normals = np.empty((len(t_ns), 3)), np.empty((len(t_ns), 3))
+    uniforms, normals = np.empty((len(t_ns), 4)), np.empty((len(t_ns), 3))
     _draw_sightings(key, t_ns, identity, uniforms, normals)
     return uniforms, normals
+
+
+@njit(cache=True, nogil=True)
+def _draw_names(identity, life, out):  # type: ignore[no-untyped-def]
+    for i in range(len(identity)):
+        if life[i] == 0:
+            out[i] = identity[i]
+        else:
+            out[i] = np.int64(tile_state(0, life[i], identity[i], 0) >> _ID_SHIFT)
+
+
+def draw_names(identity: Ints, life: Ints) -> Ints:
+    """Name landmarks that were lost and found again: each life has a name, the first its own.
+
+    Args:
+        identity: Names of the landmarks, Shape (n,).
+        life: How often each was lost before, Shape (n,).
+
+    Returns:
+        Positive names below 2^53, Shape (n,).
+    """
+    names = np.empty(len(identity), np.int64)
+    _draw_names(identity, life, names)
+    return names

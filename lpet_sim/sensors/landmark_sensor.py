@@ -8,7 +8,7 @@ parameter does not touch: the same landmarks, the same chances, the same noise i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from lpet_sim.recording.trajectory import Trajectory
 from lpet_sim.recording.truth import BodyTruth
 from lpet_sim.rng import stream
 from lpet_sim.sensors.landmark_drift import sizes, slide, walks
-from lpet_sim.sensors.landmark_kernels import draw_sightings
+from lpet_sim.sensors.landmark_kernels import draw_names, draw_sightings
 from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec, SightingNoiseSpec
 from lpet_sim.sensors.landmark_view import LandmarkView
 from lpet_sim.terrain.terrain import Terrain
@@ -148,6 +148,8 @@ def report_sightings(
     key = int(stream(seed, "landmarks", "sightings").integers(2**62))
     uniforms, normals = draw_sightings(key, shown.t_ns[shown.image], shown.landmark_id)
     found = uniforms[:, 0] < spec.detection_probability
+    if spec.loss_probability > 0:
+        shown = _lost(shown, uniforms[:, 3] < spec.loss_probability)
     noise, true_px = spec.noise, shown.stereo_px
     if noise.drift_px > 0:
         true_px, seen = _slid(shown, calibration, spec, seed)
@@ -165,6 +167,22 @@ def report_sightings(
     return SightingStream(
         shown.t_ns.copy(), offsets, names[found], stereo_px[found], declared, drift_px
     )
+
+
+def _lost(shown: ShownLandmarks, lost: NDArray[np.bool_]) -> ShownLandmarks:
+    """Give landmarks another name from each showing on at which they are lost; the first is none.
+
+    Args:
+        shown: What the images show.
+        lost: Which showings a landmark is lost before, Shape (m,).
+    """
+    order = np.lexsort((shown.image, shown.landmark_id))
+    _, first = np.unique(shown.landmark_id[order], return_index=True)
+    so_far = np.cumsum(lost[order], dtype=np.int64)
+    before = np.repeat(so_far[first], np.diff(first, append=len(order)))
+    life = np.empty(len(order), np.int64)
+    life[order] = so_far - before
+    return replace(shown, landmark_id=draw_names(shown.landmark_id, life))
 
 
 def _slid(

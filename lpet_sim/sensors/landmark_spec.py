@@ -78,9 +78,9 @@ class SightingNoiseSpec(Spec):
         resolution_px: Coordinates are rounded to multiples of this; 0: not at all.
         declared_sigma_px: What an estimator is told of the noise; None: the root mean square of the
             three white ones, or the calibration's where they are all 0.
-        drift_px: Random walk of what stands for a landmark, in the image that showed it first, with
-            the distance driven, 1 sigma of each coordinate, root mean square over landmarks
-            [px/sqrt(m)]; 0: tracks do not slide. docs/slam.md has what rendered images show.
+        drift_px: Random walk of what stands for a landmark in the images, with the distance driven,
+            1 sigma of each coordinate, root mean square over landmarks [px/sqrt(m)]; 0: tracks do
+            not slide. docs/slam.md has what rendered images show.
         drift_spread: Standard deviation of the logarithm of a landmark's own drift, drawn once for
             it; 0: all slide alike.
         declared_drift_px: What an estimator is told of it [px/sqrt(m)]; None: the true one.
@@ -110,6 +110,8 @@ class LandmarkSensorSpec(Spec):
         noise: What is wrong with their coordinates.
         detection_probability: Share of the shown landmarks that a front end finds, drawn anew for
             each image.
+        loss_probability: Chance that a front end loses a shown landmark for good from one of its
+            images to the next: from then on it is another one, with a new name and its own drift.
         misclassification_probability: Share of the sightings that carry the name of another
             landmark shown in the same image.
         disparity_bias_px: Bias of every measured disparity ``u_left - u_right`` [px].
@@ -122,6 +124,7 @@ class LandmarkSensorSpec(Spec):
     visibility: VisibilitySpec = VisibilitySpec()
     noise: SightingNoiseSpec = SightingNoiseSpec()
     detection_probability: Share = 0.8
+    loss_probability: Share = 0.0
     misclassification_probability: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     disparity_bias_px: float = 0.0
     focal_scale_error: Annotated[float, Field(gt=-0.5, lt=0.5)] = 0.0

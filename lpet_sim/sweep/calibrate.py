@@ -74,13 +74,21 @@ def calibrate_sensor(
     simulated = recording.manifest.source == "simulation"
     sightings = since(recording.measurements.sightings, from_image)
     fit = fit_sensor(sightings, truth, stereo, settle=not simulated)
-    progress(0.6)
     spec = sensor_spec(fit)
     if not simulated:
         return Calibrated(fit, spec, None)
+    progress(0.6)
+
+    def sensed_by(spec: LandmarkSensorSpec) -> SensorFit:
+        return fit_sensor(sense_recording(recording, spec, seed), truth, stereo)
+
     spec = _with_density(spec, fit, recording, seed)
+    sensed = sensed_by(spec)
     progress(0.8)
-    sensed = fit_sensor(sense_recording(recording, spec, seed), truth, stereo)
+    lost = _lost_beyond(fit, sensed)
+    if lost > 0.0:
+        spec = _with_density(sensor_spec(fit, lost), fit, recording, seed)
+        sensed = sensed_by(spec)
     progress(1.0)
     return Calibrated(fit, spec, sensed)
 
@@ -95,19 +103,36 @@ def _known(recording: Recording) -> tuple[Trajectory, StereoCalibration]:
     return recording.truth.trajectory, stereo
 
 
-def sensor_spec(fit: SensorFit) -> LandmarkSensorSpec:
+def _lost_beyond(fit: SensorFit, sensed: SensorFit) -> float:
+    """Give the share of sightings that are lost and not hidden, out of range or crowded out.
+
+    Args:
+        fit: Measured on the recording.
+        sensed: Measured on the sensor that stands for it, which loses none for good.
+    """
+    rates = [(one.tracks.lost, one.tracks.sightings.sum()) for one in (fit, sensed)]
+    error = np.sqrt(sum(p * (1.0 - p) / n for p, n in rates))
+    more = fit.tracks.lost - sensed.tracks.lost
+    return float(more) if more > _SURE * error else 0.0
+
+
+def sensor_spec(fit: SensorFit, lost: float = 0.0) -> LandmarkSensorSpec:
     """Make the landmark sensor of measured figures; how dense landmarks are is left at its default.
 
-    A landmark of this sensor is found anew in each image, so the detection probability is how often
-    one in view is seen in the next image: two images then share as many as they did. Its noise has
-    no memory: what changes slowly is added to the fixed error.
+    A landmark of this sensor is found anew in each image, unless it is lost for good. Detection and
+    loss are such that a sighting is followed by another in the next image, and by another at all,
+    as often as it was: two images then share as many as they did, and tracks are as long.
+
+    Args:
+        fit: What was measured.
+        lost: Share of the sightings that are their track's last, though the landmark is in view and
+            nothing hides it.
     """
-    left, right, v = white = np.maximum(white_px(fit), _SIGMA_MIN_PX)
+    detection, loss = chances(fit.tracks.seen_next, lost)
     sure = np.abs(fit.shared[:3]) > _SURE * fit.shared_se[:3]
     disparity, focal, baseline = (float(x) for x in np.where(sure, fit.shared[:3], 0.0))
-    tracks, sure_fixed = fit.tracks, fit.noise.fixed_px[0] > _SURE * fit.noise.fixed_px[1]
-    slow_px2 = max(float(np.mean(fit.noise.sigma_px**2 - white**2)), 0.0)
-    fixed_px = fit.noise.fixed_px[0] if sure_fixed else 0.0
+    tracks, slides = fit.tracks, fit.drift is not None and fit.drift.slides
+    wrong = fit.drift.wrong if fit.drift is not None and slides else tracks.impossible
     return LandmarkSensorSpec(
         period_s=tracks.period_s,
         visibility=VisibilitySpec(
@@ -115,20 +140,66 @@ def sensor_spec(fit: SensorFit) -> LandmarkSensorSpec:
             range_min_m=float(tracks.range_m[0]),
             range_max_m=tracks.range_near_m,
             range_full_m=float(tracks.range_m[0]),
-            sightings_max=max(round(float(tracks.sightings.mean() / tracks.seen_next)), 1),
+            sightings_max=max(round(float(tracks.sightings.mean() / detection)), 1),
         ),
-        noise=SightingNoiseSpec(
-            sigma_left_px=float(left),
-            sigma_right_px=float(right),
-            sigma_v_px=float(v),
-            bias_sigma_px=float(np.hypot(fixed_px, np.sqrt(slow_px2))),
-            declared_sigma_px=fit.noise.declared_px,
-        ),
-        detection_probability=tracks.seen_next,
-        misclassification_probability=min(tracks.impossible, 0.99),
+        noise=sliding_noise(fit) if slides else still_noise(fit),
+        detection_probability=detection,
+        loss_probability=loss,
+        misclassification_probability=min(wrong, 0.99),
         disparity_bias_px=disparity,
         focal_scale_error=focal,
         baseline_scale_error=baseline,
+    )
+
+
+def chances(seen_next: float, lost: float) -> tuple[float, float]:
+    """Give the chances of detection d and of loss p, each image, of landmarks that stay in view.
+
+    A sighting is followed by one in the next image with ``s = (1 - p) d``, and by none at all with
+    ``l = p / (p + d - p d)``: ``p = l s / (1 - l)``, ``d = s / (1 - p)``.
+
+    Args:
+        seen_next: Share s of the sightings that are followed by one in the next image.
+        lost: Share l of the sightings that are their track's last.
+    """
+    loss = min(lost * seen_next / max(1.0 - lost, seen_next), 1.0 - seen_next)
+    return min(seen_next / max(1.0 - loss, 1e-9), 1.0), loss
+
+
+def still_noise(fit: SensorFit) -> SightingNoiseSpec:
+    """Make the noise of tracks that do not slide: what changes slowly adds to the fixed error."""
+    left, right, v = white = np.maximum(white_px(fit), _SIGMA_MIN_PX)
+    sure_fixed = fit.noise.fixed_px[0] > _SURE * fit.noise.fixed_px[1]
+    slow_px2 = max(float(np.mean(fit.noise.sigma_px**2 - white**2)), 0.0)
+    fixed_px = fit.noise.fixed_px[0] if sure_fixed else 0.0
+    return SightingNoiseSpec(
+        sigma_left_px=float(left),
+        sigma_right_px=float(right),
+        sigma_v_px=float(v),
+        bias_sigma_px=float(np.hypot(fixed_px, np.sqrt(slow_px2))),
+        declared_sigma_px=fit.noise.declared_px,
+        declared_drift_px=fit.declared_drift_px,
+    )
+
+
+def sliding_noise(fit: SensorFit) -> SightingNoiseSpec:
+    """Make the noise of tracks that slide: white, as the walk leaves it, and the walk.
+
+    What differs between consecutive images holds some of the walk, so that it only tells how white
+    noise is shared by the coordinates; and a fixed error would explain a walk once more, for over
+    one track they look alike.
+    """
+    assert fit.drift is not None
+    share = white_px(fit) / np.sqrt(np.mean(white_px(fit) ** 2))
+    left, right, v = np.maximum(fit.drift.sigma_px.value * share, _SIGMA_MIN_PX)
+    return SightingNoiseSpec(
+        sigma_left_px=float(left),
+        sigma_right_px=float(right),
+        sigma_v_px=float(v),
+        drift_px=fit.drift.spread.drift_px,
+        drift_spread=fit.drift.spread.spread,
+        declared_sigma_px=fit.noise.declared_px,
+        declared_drift_px=fit.declared_drift_px,
     )
 
 
@@ -147,7 +218,7 @@ def _with_density(
     they fade from further on, and their median range is larger than the one measured.
     """
     range_m, images = _probe(spec, recording, seed)
-    wanted = float(fit.tracks.sightings.mean()) / fit.tracks.seen_next * images
+    wanted = float(fit.tracks.sightings.mean()) / spec.detection_probability * images
     near_m, wanted_near = range_m[range_m < FAR_M], wanted * (1.0 - fit.tracks.far)
 
     def shown(full_m: float) -> float:

@@ -46,11 +46,12 @@ def path() -> CameraPath:
 
 
 def tracks(drift_px: float, spread: float = 0.0, wrong: float = 0.0) -> Tracks:
-    """Sense, with white noise and a walk."""
+    """Sense, with white noise and a walk; little noise where landmarks slide unlike."""
+    sigma_px = SIGMA_PX if spread == 0 else 0.2 * SIGMA_PX
     noise = SightingNoiseSpec(
-        sigma_left_px=SIGMA_PX,
-        sigma_right_px=SIGMA_PX,
-        sigma_v_px=SIGMA_PX,
+        sigma_left_px=sigma_px,
+        sigma_right_px=sigma_px,
+        sigma_v_px=sigma_px,
         drift_px=drift_px,
         drift_spread=spread,
     )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lpet_sim.geometry import SE3
 from lpet_sim.recording.streams import SightingStream
 from lpet_sim.rng import stream
 from lpet_sim.sensors.landmark_drift import sizes, slide, walks
@@ -112,42 +113,62 @@ def test_a_landmark_walks_on_while_it_is_not_shown() -> None:
 
 
 def test_a_landmark_is_seen_where_it_has_walked_to(shown: ShownLandmarks) -> None:
-    """Against the world: the point of the walked sighting in its first image, projected."""
-    _, first = np.unique(shown.landmark_id, return_index=True)
-    first = first[np.unique(shown.landmark_id, return_inverse=True)[1]]
+    """Against the world: each image's point is projected into the next, and takes a step there."""
+    name, image, poses = shown.landmark_id, shown.image, shown.T_world_camera
     walk = stream(1, "walks").normal(0.0, 0.2, shown.stereo_px.shape)
-    walk[first] = 0.0
-    poses = shown.T_world_camera
-    out, seen = slide(shown.stereo_px, shown.landmark_id, shown.image, poses, walk, CAMERA)
-    p_first = CAMERA.triangulate(shown.stereo_px[first] + walk)
-    p_world = poses[shown.image[first]] @ p_first
-    wanted = CAMERA.project(poses[shown.image].inverse() @ p_world)
-    np.testing.assert_allclose(out[seen], wanted[seen], atol=1e-7)
-    assert np.mean(seen) > 0.95
-    assert np.array_equal(seen, np.all((wanted >= 0) & (wanted <= 1023), axis=1))
-    still, _ = slide(
-        shown.stereo_px, shown.landmark_id, shown.image, poses, np.zeros_like(walk), CAMERA
-    )
-    np.testing.assert_allclose(still, shown.stereo_px, atol=1e-8)
+    out, seen = slide(shown.stereo_px, name, image, poses, walk, CAMERA)
+    order = np.lexsort((image, name))
+    a, b = order[:-1], order[1:]
+    same = (name[a] == name[b]) & (out[a, 0] - out[a, 1] > 0.3)
+    a, b = a[same & seen[a] & seen[b]], b[same & seen[a] & seen[b]]
+    p_world = poses[image[a]] @ CAMERA.triangulate(out[a])
+    before = CAMERA.project(poses[image[b]].inverse() @ p_world)
+    np.testing.assert_allclose(out[b], before + walk[b] - walk[a], atol=1e-7)
+    first = np.unique(name, return_index=True)[1]
+    assert np.array_equal(out[first], shown.stereo_px[first]) and len(b) > 10_000
+    assert np.mean(seen) > 0.9
+    still, _ = slide(shown.stereo_px, name, image, poses, np.zeros_like(walk), CAMERA)
+    np.testing.assert_allclose(still, shown.stereo_px, atol=1e-7)
 
 
 def test_tracks_slide_by_what_was_asked_for(shown: ShownLandmarks) -> None:
-    """Taken back into the images that showed them first, over the root of the distance driven."""
-    seen = report(shown, drift_px=DRIFT_PX)
-    image = np.repeat(np.arange(len(seen)), np.diff(seen.offsets))
-    _, first, which = np.unique(seen.landmark_id, return_index=True, return_inverse=True)
-    near = seen.stereo_px[first, 0] - seen.stereo_px[first, 1] > 4.0
+    """Consecutive images of a landmark, near or far, old or new, over the root of the distance."""
+    seen = by_row(report(shown, drift_px=DRIFT_PX))
     poses = shown.T_world_camera
-    p_first = poses[image[first][which]].inverse() @ (
-        poses[image] @ CAMERA.triangulate(seen.stereo_px)
-    )
-    driven_m = 0.1 * (image - image[first][which])
-    later = (driven_m > 0.75) & (driven_m < 0.85) & near[which]
-    walk = (CAMERA.project(p_first[later]) - seen.stereo_px[first][which][later]) / np.sqrt(
-        driven_m[later, None]
-    )
-    assert len(walk) > 600
-    np.testing.assert_allclose(walk.std(axis=0), DRIFT_PX, rtol=5 / np.sqrt(2 * len(walk)))
+    step = np.linalg.norm(np.diff(body(poses).translation, axis=0), axis=1)
+    steps = []
+    for k in range(5, 30, 5):
+        both = [name for image, name in seen if image == k and (k - 1, name) in seen]
+        here, before = (np.array([seen[i, name] for name in both]) for i in (k, k - 1))
+        near = before[:, 0] - before[:, 1] > 0.5
+        T_now_before = poses[k].inverse() @ poses[k - 1]
+        there = CAMERA.project(T_now_before @ CAMERA.triangulate(before[near]))
+        steps.append((here[near] - there) / np.sqrt(step[k - 1]))
+    walked = np.concatenate(steps)
+    assert len(walked) > 1000
+    np.testing.assert_allclose(walked.std(axis=0), DRIFT_PX, rtol=5 / np.sqrt(2 * len(walked)))
+
+
+def body(T_world_camera: SE3) -> SE3:
+    """Give the body's poses."""
+    return T_world_camera @ CAMERA.T_body_camera.se3().inverse()
+
+
+def test_landmarks_that_are_lost_come_back_under_another_name(shown: ShownLandmarks) -> None:
+    """A share of the showings but the first; places and noise stay, and names are unique."""
+    noise = QUIET.model_copy(update={"sigma_left_px": 0.4})
+    kept = BARE.model_copy(update={"noise": noise})
+    lost = kept.model_copy(update={"loss_probability": 0.1})
+    a, b = (report_sightings(shown, CAMERA, spec, SEED) for spec in (kept, lost))
+    assert np.array_equal(a.stereo_px, b.stereo_px)
+    image = shown.image
+    order = np.lexsort((image, shown.landmark_id))
+    again = np.diff(shown.landmark_id[order]) == 0
+    renamed = np.diff(b.landmark_id[order])[again] != 0
+    assert renamed.mean() == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / again.sum()))
+    pairs = np.unique(np.stack([a.landmark_id, b.landmark_id]), axis=1)
+    assert len(np.unique(pairs[1])) == pairs.shape[1]
+    assert len(pairs[1]) == len(np.unique(a.landmark_id)) + renamed.sum()
 
 
 def test_what_slides_out_of_the_images_is_not_reported(shown: ShownLandmarks) -> None:

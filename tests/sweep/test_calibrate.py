@@ -14,9 +14,10 @@ from lpet_sim.recording.recording import Manifest, Recording
 from lpet_sim.recording.streams import Measurements
 from lpet_sim.recording.truth import Truth
 from lpet_sim.recording.writer import write_recording
+from lpet_sim.rng import stream
 from lpet_sim.rover.spec import DriveSpec
 from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec, SightingNoiseSpec, VisibilitySpec
-from lpet_sim.sweep.calibrate import Calibrated, calibrate_sensor
+from lpet_sim.sweep.calibrate import Calibrated, calibrate_sensor, chances
 from lpet_sim.sweep.sensing import sense_recording
 from lpet_sim.sweep.traverse import TraverseSpec
 from lpet_sim.terrain.terrain import build_terrain
@@ -98,6 +99,33 @@ def test_the_new_sensor_sees_as_much_and_as_far_as_the_old(found: Calibrated) ->
     np.testing.assert_allclose(new.tracks.range_m[2:4], old.tracks.range_m[2:4], rtol=0.2)
     assert new.tracks.far == pytest.approx(old.tracks.far, abs=0.06)
     np.testing.assert_allclose(new.noise.sigma_px, old.noise.sigma_px, rtol=0.1)
+
+
+def test_chances_of_detection_and_loss_are_those_of_what_follows_a_sighting() -> None:
+    """Against 200,000 landmarks that are always in view, followed for 60 images."""
+    detection, loss = chances(0.6, 0.1)
+    rng = stream(4, "chances")
+    there = np.cumprod(rng.random((200_000, 60)) >= loss, axis=1) > 0
+    seen = there & (rng.random(there.shape) < detection)
+    assert seen[:, 0].mean() == pytest.approx(0.6, abs=0.005)
+    assert 1.0 - seen.any(axis=1).mean() == pytest.approx(0.1, abs=0.005)
+    assert chances(0.7, 0.0) == (0.7, 0.0)
+
+
+def test_tracks_that_slide_and_are_lost_come_back(recording: Recording) -> None:
+    """Drift to a tenth; what pairs differ by, image for image, in the new sensor as in the old."""
+    noise = NOISE.model_copy(update={"drift_px": 0.6, "declared_drift_px": 0.5})
+    spec = SPEC.model_copy(update={"noise": noise, "period_s": 1.0, "loss_probability": 0.1})
+    sightings = sense_recording(recording, spec)
+    slid = replace(recording, measurements=replace(recording.measurements, sightings=sightings))
+    found = calibrate_sensor(slid)
+    old, new = found.fit.drift, found.sensed.drift if found.sensed is not None else None
+    assert old is not None and new is not None
+    assert old.drift_px.value == pytest.approx(0.6, rel=0.1)
+    assert found.spec.noise.declared_drift_px == 0.5
+    assert found.spec.loss_probability == pytest.approx(0.1, abs=0.04)
+    np.testing.assert_allclose(new.by_mean_px, old.by_mean_px, rtol=0.1)
+    np.testing.assert_allclose(new.by_median_px, old.by_median_px, rtol=0.1)
 
 
 def test_the_command_writes_a_sensor_that_loads_and_a_picture(
