@@ -31,6 +31,7 @@ BUDGET = "no way found within the budget"
 
 _DRAWS = 2000
 _GOAL_HEADINGS = 8
+_PLACES_SEARCHED = 3
 _DIGITS = 4
 
 
@@ -132,9 +133,6 @@ class Reacher:
                     places.setdefault(int(group), self.map.point(row, column))
         return places
 
-    def _group(self, xy: Point) -> int:
-        return int(self._bridges.joined[self.map.sure_region[self.map.node(xy)]])
-
     def _random_start(self, rng: np.random.Generator) -> Point:
         """Draw one; where no place of the ring will do, the last draw stays and counts as it is."""
         box, ring, goal = self._spec.box, self._spec.start_distances_m, self._spec.goal_m
@@ -173,22 +171,18 @@ class Reacher:
             return StartResult(start, "undecided", TIGHT_START)
         if not self.goal_places:
             return StartResult(start, "undecided", TIGHT_GOAL)
-        ways = {
-            "map": self._wave.corners_from(start),
-            "ompl": self._searched(start, number, effort),
-        }
-        found = {name: way for name, way in ways.items() if way}
-        if not found:
+        # The wave is complete on its nodes and shorter, the planner finds what lies between them.
+        by, corners = "map", self._wave.corners_from(start)
+        if not corners:
+            by, corners = "ompl", self._searched(start, number, effort)
+        if not corners:
             return StartResult(start, "undecided", BUDGET)
-        name = min(found, key=lambda name: length_of(found[name]))
-        path = tuple((round(x, _DIGITS), round(y, _DIGITS)) for x, y in found[name])
-        return StartResult(start, "reachable", "", name, path, length_of(found[name]))
+        path = tuple((round(x, _DIGITS), round(y, _DIGITS)) for x, y in corners)
+        return StartResult(start, "reachable", "", by, path, length_of(corners))
 
     def _searched(self, start: Point, number: int, effort: int) -> list[Point]:
-        """Search for a way to the goal's place in the start's group; without one, to every one."""
-        search, group, seed = self._spec.search, self._group(start), self._search_seed(number)
-        joined = [self._place_of[group]] if group > 0 and group in self._place_of else []
-        for place in joined or self.goal_places:
+        search, seed = self._spec.search, self._search_seed(number)
+        for place in self.goal_places[:_PLACES_SEARCHED]:
             corners = search_straights(
                 self.map, start, place, effort * search.iterations, search.stride_m, seed
             )
@@ -214,7 +208,7 @@ class Reacher:
         return StartResult(start, "reachable", "", "ompl", path, length)
 
     def _goal_poses(self) -> list[Pose]:
-        places = self.goal_places or [self._spec.goal_m]
+        places = self.goal_places[:_PLACES_SEARCHED] or [self._spec.goal_m]
         headings = 2 * np.pi * np.arange(_GOAL_HEADINGS) / _GOAL_HEADINGS
         return [(*place, float(heading)) for place in places for heading in headings]
 

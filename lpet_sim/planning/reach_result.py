@@ -30,7 +30,8 @@ class StartResult:
         outcome: Reachable: a way was found. Unreachable: even the disc that the body covers at
             every heading cannot get there. Undecided: neither.
         reason: Why it is not reachable; empty where it is.
-        found_by: ``ompl`` or ``map``, whichever way is the shorter; empty where there is none.
+        found_by: ``map``: the wave over the nodes where the rover can turn; ``ompl``: the planner,
+            asked where the wave does not come, and for all curves; empty where there is none.
         path_m: The way: corners (x, y) of straights with turns on the spot, or, with limited
             curvature, poses (x, y, heading) along it [m, rad].
         length_m: Length of the way [m]; 0 where there is none.

@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, label
 
 from lpet_sim.planning.mobility import MobilitySpec
+from lpet_sim.planning.reach_spec import ReachSpec
 from lpet_sim.terrain.rocks import Rocks
 
 Array = NDArray[np.float64]
@@ -116,3 +118,45 @@ def _overlaps(poses: Array, outline: Array, rectangle: Rectangle) -> bool:
         nearest = (nx * rectangle.corners[:, 0] + ny * rectangle.corners[:, 1]).min(axis=1)
         apart |= nearest >= limit
     return bool(np.any(~apart))
+
+
+def disc_gets_there(start: tuple[float, float], rocks: Rocks, spec: ReachSpec) -> bool:
+    """Tell whether a disc a little larger than the inscribed one gets from a start to the goal.
+
+    Rocks alone count. Over a picture of the outlines with pixels of 2 cm; the disc is larger by 4
+    cm, which is more than what the pixels may be off by, so that a way of its own proves that the
+    inscribed disc has one.
+
+    Args:
+        start: Where the disc begins [m].
+        rocks: All rocks near the square.
+        spec: The study.
+    """
+    mobility, pixel = spec.mobility, 0.02
+    fits = (rocks.height_m <= mobility.belly_height_m) & (
+        2.0 * rocks.reach_m <= mobility.straddle_width_m
+    )
+    x = np.arange(spec.box.x_min, spec.box.x_max + pixel / 2, pixel)
+    blocked = np.zeros((len(x), len(x)), dtype=bool)
+    for outline in rocks.select((rocks.height_m > mobility.climb_height_m) & ~fits).outlines():
+        _fill(blocked, outline, x)
+    away = distance_transform_edt(~blocked) * pixel if blocked.any() else np.full(blocked.shape, 99)
+    reach = min(mobility.front_m, mobility.rear_m, mobility.half_width_m) + mobility.margin_m
+    region, _ = label(away >= reach + 0.04, np.ones((3, 3)))
+    row, column = (round((value - x[0]) / pixel) for value in (start[1], start[0]))
+    goal = np.hypot(x[None] - spec.goal_m[0], x[:, None] - spec.goal_m[1]) <= spec.goal_radius_m
+    here = region[row, column]
+    return bool(here > 0 and np.any(region[goal] == here))
+
+
+def _fill(blocked: NDArray[np.bool_], outline: Array, x: Array) -> None:
+    """Mark the pixels within a convex outline; the square's axes have the same pixels."""
+    columns, rows = (
+        slice(*np.searchsorted(x, [outline[:, axis].min(), outline[:, axis].max()]))
+        for axis in (0, 1)
+    )
+    px, py = np.meshgrid(x[columns], x[rows])
+    inside = np.ones(px.shape, dtype=bool)
+    for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        inside &= (b[0] - a[0]) * (py - a[1]) - (b[1] - a[1]) * (px - a[0]) >= 0
+    blocked[rows, columns] |= inside
