@@ -165,12 +165,14 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=OUT)
     parser.add_argument("--data-sets", type=Path, help="where the paper's traverses are")
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--draws", type=int, help="fewer draws than the five of the spec")
     told = parser.parse_args()
     folder = output_folder(told.out)
     spec = TradeoffSpec.from_yaml(SPEC)
     assert spec.simulation is not None
     drive = recording_of(folder, told.data_sets, told.quick)
-    runs = {"recordings": (str(drive),), "draws": 1 if told.quick else spec.simulation.draws}
+    draws = told.draws or (1 if told.quick else spec.simulation.draws)
+    runs = {"recordings": (str(drive),), "draws": draws}
     sampling = SamplingSpec(count=4) if told.quick else spec.sampling
     told_spec = spec.model_copy(
         update={"simulation": spec.simulation.model_copy(update=runs), "sampling": sampling}

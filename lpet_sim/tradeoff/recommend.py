@@ -282,6 +282,6 @@ def survivors(predictions: Sequence[Prediction], on_front: Ints, first: int, mos
     rest = [int(i) for i in on_front if i != first]
     rest.sort(key=lambda i: predictions[i].error_ratio)
     if len(rest) > most - 1:
-        at = np.linspace(0, len(rest) - 1, most - 1).round().astype(np.int64)
+        at = np.linspace(0, len(rest) - 1, max(0, most - 1)).round().astype(np.int64)
         rest = [rest[i] for i in np.unique(at)]
     return np.array(sorted({first, *rest}), dtype=np.int64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from lpet_sim.outputs import output_folder
 from lpet_sim.progress import Count, Progress, silent, uncounted
-from lpet_sim.recording.arrays import Ints
+from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.sweep.sweep_pool import Pool
 from lpet_sim.tradeoff.recommend import (
     Efficiency,
@@ -33,7 +33,6 @@ from lpet_sim.tradeoff.spec import TradeoffSpec
 from lpet_sim.tradeoff.static import Prediction, predict_all, setting_of
 
 _PREDICTED = 0.85
-Simulate = Callable[[Ints], Mapping[int, SimulatedCandidate]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,13 +89,6 @@ def run_tradeoff(
         LpetError: The space is empty, a recording cannot be used, or the folder not written.
     """
     home = output_folder(folder)
-
-    def simulate(chosen: Ints, predictions: list[Prediction]) -> dict[int, SimulatedCandidate]:
-        if spec.simulation is None or static_only:
-            return {}
-        told = {int(i): predictions[i].candidate for i in chosen}
-        return simulate_candidates(spec, told, home, seed, pool or Pool(), count)
-
     setting = setting_of(spec, seed)
     candidates = draw_candidates(spec.space, spec.sampling, seed)
     predictions = predict_all(candidates, setting, lambda x: progress(_PREDICTED * x))
@@ -105,8 +97,12 @@ def run_tradeoff(
     costs = weighted_costs(predictions, spec.rule)
     judged = _judged({int(i): assumed(spec.rule) for i in kept}, predictions, costs, spec)
     picked = recommend(judged, spec)
-    most = spec.simulation.survivors_max if spec.simulation else 0
-    simulated = simulate(survivors(predictions, front, picked.judged.index, most), predictions)
+    simulated: dict[int, SimulatedCandidate] = {}
+    if spec.simulation is not None and not static_only:
+        most = spec.simulation.survivors_max
+        chosen = survivors(predictions, front, picked.judged.index, most)
+        told_of = {int(i): predictions[i].candidate for i in chosen}
+        simulated = simulate_candidates(spec, told_of, home, seed, pool or Pool(), count)
     if simulated:
         told = {i: s.efficiency for i, s in simulated.items()}
         judged = _judged(told, predictions, costs, spec)
@@ -120,7 +116,7 @@ def run_tradeoff(
 def _judged(
     efficiencies: Mapping[int, Efficiency],
     predictions: list[Prediction],
-    costs: np.ndarray[tuple[int], np.dtype[np.float64]],
+    costs: Array,
     spec: TradeoffSpec,
 ) -> tuple[Judged, ...]:
     return tuple(

@@ -75,8 +75,8 @@ class View:
             world: The landmarks that the path comes near enough to.
             shown: Who is seen from where, Shape (k, n).
         """
-        self._candidate, self._setting, self._poses = candidate, setting, T_world_body
-        self._calibration, self._world, self._shown = calibration, world, shown
+        self._candidate, self._setting, self.T_world_body = candidate, setting, T_world_body
+        self.calibration, self.world, self.shown = calibration, world, shown
 
     @classmethod
     def of(cls, candidate: Candidate, setting: Setting) -> View:
@@ -97,39 +97,40 @@ class View:
 
     def sighted(self) -> tuple[float, float, float]:
         """Give the mean number of landmarks shown, of far ones, and the median range of others."""
-        near = self._shown & ~self._world.is_far
+        near = self.shown & ~self.world.is_far
         station, i = np.nonzero(near)
-        apart = self._world.p_world[i] - self._poses.translation[station]
+        eyes = (self.T_world_body @ self.calibration.T_body_camera.se3()).translation
+        apart = self.world.p_world[i] - eyes[station]
         ranges = np.linalg.norm(apart, axis=1)
-        far = self._shown.sum() - near.sum()
-        count = len(self._poses)
+        far = self.shown.sum() - near.sum()
+        count = len(self.T_world_body)
         median = float(np.median(ranges)) if len(ranges) else math.nan
-        return float(self._shown.sum() / count), float(far / count), median
+        return float(self.shown.sum() / count), float(far / count), median
 
     def end_covariance(self) -> Array:
         """Give the covariance of the last pose when all else is eliminated, Shape (6, 6)."""
-        count, lasting = len(self._poses), 4
+        count, lasting = len(self.T_world_body), 4
         info = np.zeros((_POSE * count,) * 2)
-        poses = np.array(self._poses.rotation), np.array(self._poses.translation)
-        T_body_camera = self._calibration.T_body_camera.se3()
+        poses = np.array(self.T_world_body.rotation), np.array(self.T_world_body.translation)
+        T_body_camera = self.calibration.T_body_camera.se3()
         mount = np.array(T_body_camera.rotation), np.array(T_body_camera.translation)
-        told = (camera_row(self._calibration), self._weights(), self._world.p_world, self._shown)
+        told = (camera_row(self.calibration), self._weights(), self.world.p_world, self.shown)
         add_landmarks(poses, mount, *told, self._memory(), info)
         # Lasting errors come first and the end last; the start is given.
         whole = np.eye(lasting + _POSE * (count - 1))
         whole[lasting:, lasting:] = info[_POSE:, _POSE:]
-        _add_odometry(whole, lasting, self._poses, *self._odometry())
+        _add_odometry(whole, lasting, self.T_world_body, *self._odometry())
         root = cholesky(whole, lower=True)[-_POSE:, -_POSE:]
         inverse = np.linalg.inv(root)
         return np.asarray(inverse.T @ inverse)
 
     def _step_m(self) -> float:
-        return self._setting.path_m / (len(self._poses) - 1)
+        return self._setting.path_m / (len(self.T_world_body) - 1)
 
     def _weights(self) -> Array:
         """Give the sightings of each landmark at a station over the variance of one."""
         lumped = self._step_m() / self._candidate.image_interval_m
-        images = np.full(len(self._poses), max(1.0, lumped))
+        images = np.full(len(self.T_world_body), max(1.0, lumped))
         site = self._setting.site
         images[0] = 1.0 + site.standstill_s / self._candidate.period_s(site.speed_mps)
         images[-1] = max(1.0, 0.5 * lumped)
@@ -157,7 +158,7 @@ class View:
 
     def _slipped(self) -> Array:
         """Give what slips, evenly along the path, add to the variances, Shape (k - 1, 6)."""
-        so_far = self._poses.translation[:, 0] * self._setting.site.slips_per_m
+        so_far = self.T_world_body.translation[:, 0] * self._setting.site.slips_per_m
         slips = np.diff(np.floor(so_far + 0.5))
         least = SlamSpec()
         moved_m = max(self._candidate.image_interval_m, least.slip_sigma_m)

@@ -53,12 +53,13 @@ def plot_pareto(result: TradeoffResult) -> Figure:
         axes.plot(x[held], y[held], "o", ms=3, color=COLOURS[5], label="keeps to the constraints")
         front = result.front
         axes.plot(x[front], y[front], "o", ms=4, color=COLOURS[1], label="Pareto set")
-        axes.plot(x[picked], y[picked], "*", ms=16, color=COLOURS[0], label="recommended")
-        axes.set(xlabel=label, xscale="log", yscale="log")
+        star = {"marker": "*", "ms": 15, "ls": "none", "mec": "white"}
+        axes.plot(x[picked], y[picked], color=COLOURS[0], label="recommended", **star)
+        axes.set(xlabel=label, xscale="linear" if k == len(_PROXIES) else "log", yscale="log")
         _limit(axes, result)
         axes.grid(alpha=0.3, which="both")
     panels[0].set_ylabel(f"predicted error after {result.spec.site.distance_m:g} m [%]")
-    panels[-1].legend(loc="best", fontsize="small")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
 
 
