@@ -13,7 +13,9 @@ from rich.console import Console
 from lpet_sim.cli_reach import reach
 from lpet_sim.cli_report import report
 from lpet_sim.cli_rig import rig_app
+from lpet_sim.cli_study import study
 from lpet_sim.cli_sweep import sweep
+from lpet_sim.cli_tradeoff import tradeoff
 from lpet_sim.errors import LpetError
 from lpet_sim.terminal import bar, print_tables, wrote
 
@@ -31,8 +33,10 @@ import_app = typer.Typer(
 app.add_typer(import_app, name="import")
 app.add_typer(rig_app, name="rig")
 app.command()(reach)
+app.command()(study)
 app.command()(report)
 app.command()(sweep)
+app.command()(tradeoff)
 
 RecordingArgument = Annotated[Path, typer.Argument(metavar="RUN.rrd", help="A recording.")]
 SeedOption = Annotated[int, typer.Option(help="Seed of everything random.")]

@@ -54,6 +54,28 @@ def two_bars(first: str, second: str) -> Iterator[tuple[Progress, Count]]:
         yield lambda fraction: shown.update(share, completed=fraction), count
 
 
+@contextmanager
+def either_bar(title: str) -> Iterator[tuple[Progress, Count]]:
+    """Show one bar on stderr while the block runs, for work that tells a share and then counts.
+
+    Gives the same two as `two_bars`.
+    """
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}"))
+    console = Console(stderr=True)
+    hidden = not console.is_terminal
+    with ProgressBar(*columns, TimeElapsedColumn(), console=console, disable=hidden) as shown:
+        task = shown.add_task(title, total=1.0, said="")
+
+        def share(fraction: float) -> None:
+            shown.update(task, completed=fraction, total=1.0, said=f"{fraction:.0%}")
+
+        def count(done: int, total: int, failed: int) -> None:
+            said = f"{done}/{total}, {failed} failed"
+            shown.update(task, completed=done, total=total, said=said)
+
+        yield share, count
+
+
 def print_tables(tables: Iterable[Table]) -> None:
     """Print tables, wide enough to be whole where no terminal sets the width."""
     console = Console()

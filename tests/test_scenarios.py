@@ -21,6 +21,7 @@ from lpet_sim.errors import LpetError
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.sweep.simulate import simulate
 from lpet_sim.sweep.sweep_plan import expand
+from lpet_sim.study.spec import StudySpec
 from lpet_sim.sweep.sweep_spec import SweepSpec
 from lpet_sim.sweep.traverse import TraverseSpec
 from tests.command import TINY
@@ -180,11 +181,12 @@ def test_the_papers_experiment_runs_on_data_sets_driven_for_it(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.stem)
-def test_a_scenario_file_is_a_traverse(path: Path) -> None:
+def test_a_scenario_file_is_a_traverse_or_a_study(path: Path) -> None:
     """It loads, is called what its file is called, and goes to YAML and back unchanged."""
-    spec = TraverseSpec.from_yaml(path)
+    kind = StudySpec if "reach" in yaml.safe_load(path.read_text()) else TraverseSpec
+    spec = kind.from_yaml(path)
     assert spec.name == path.stem
-    assert TraverseSpec.from_mapping(yaml.safe_load(yaml.safe_dump(spec.to_mapping()))) == spec
+    assert kind.from_mapping(yaml.safe_load(yaml.safe_dump(spec.to_mapping()))) == spec
 
 
 @pytest.mark.parametrize(

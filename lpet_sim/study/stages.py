@@ -58,21 +58,12 @@ class StageResult:
     state: State
 
 
-def _quietly(stage: Stage) -> None:
-    """Say nothing of a stage that begins."""
-
-
-def run_stages(
-    stages: Sequence[Stage],
-    folder: Path,
-    begin: Callable[[Stage], None] = _quietly,
-) -> list[StageResult]:
+def run_stages(stages: Sequence[Stage], folder: Path) -> list[StageResult]:
     """Bring every product of a chain up to date; the same call after a kill goes on.
 
     Args:
         stages: The stages, each after those that it needs.
         folder: Where their products are.
-        begin: Called before a stage is made.
 
     Raises:
         OutputError: The folder cannot be written, or a stage left no product.
@@ -80,18 +71,15 @@ def run_stages(
     home, done = output_folder(folder), dict[str, StageResult]()
     for stage in stages:
         products = {name: done[name].path for name in stage.needs}
-        done[stage.name] = _brought_up_to_date(stage, products, home, begin)
+        done[stage.name] = _brought_up_to_date(stage, products, home)
     return list(done.values())
 
 
-def _brought_up_to_date(
-    stage: Stage, products: Products, home: Path, begin: Callable[[Stage], None]
-) -> StageResult:
+def _brought_up_to_date(stage: Stage, products: Products, home: Path) -> StageResult:
     path, key = home / stage.product, _key(stage, products)
     stamp = home / STAMPS / f"{stage.name}.json"
     state = _state(path, stamp, key)
     if state == "made":
-        begin(stage)
         _make_room(path, stamp, key)
         stage.make(products, path)
         if not path.exists():

@@ -95,13 +95,20 @@ def _charts(arm: str, drawings: tuple[Drawing, ...]) -> str:
 
 
 def _chart(arm: str, drawing: Drawing) -> str:
-    image = base64.b64encode(svg_of(drawing.figure).encode()).decode()
+    kind, image = _image_of(drawing)
     alt = escape(f"{drawing.title}, arm {arm}. {drawing.caption}", quote=True)
     return (
         f'<figure class="card"><h3>{escape(drawing.title)}</h3>'
-        f'<img alt="{alt}" src="data:image/svg+xml;base64,{image}">'
+        f'<img alt="{alt}" src="data:image/{kind};base64,{image}">'
         f"<figcaption>{escape(drawing.caption)}</figcaption></figure>"
     )
+
+
+def _image_of(drawing: Drawing) -> tuple[str, str]:
+    """Give the kind of a chart's image, and the image in the letters of a page."""
+    if isinstance(drawing.figure, Path):
+        return "png", base64.b64encode(drawing.figure.read_bytes()).decode()
+    return "svg+xml", base64.b64encode(svg_of(drawing.figure).encode()).decode()
 
 
 def _tables(report: SweepReport) -> str:

@@ -44,13 +44,13 @@ class Drawing:
         key: Name for files and links.
         title: Title.
         caption: What is drawn, in a sentence or two.
-        figure: The figure, in the style of the charts.
+        figure: The figure, in the style of the charts, or a picture that is there as PNG.
     """
 
     key: str
     title: str
     caption: str
-    figure: Figure
+    figure: Figure | Path
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,11 +132,13 @@ def hold_to(rows: Rows, requirement: Requirement) -> Rows:
 
 
 def write_figures(report: SweepReport, folder: Path) -> list[Path]:
-    """Write every chart as PNG into a folder and give their paths."""
+    """Write every chart that is not a picture already as PNG into a folder and give their paths."""
     output_folder(folder)
     paths = []
     for _, drawings in report.drawings:
         for drawing in drawings:
+            if isinstance(drawing.figure, Path):
+                continue
             path = folder / f"{drawing.key}.png"
             with whole_file(path) as temporary, draw.chart_style():
                 save(drawing.figure, temporary)
