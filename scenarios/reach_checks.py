@@ -83,10 +83,10 @@ def sweep(quick: bool, abundances: bool) -> ReachSpec:
     basic: Row = {
         "name": "by abundance" if abundances else "by K",
         "terrain": "exomars",
-        "size_m": 20.0 if quick else 60.0,
+        "size_m": 20.0 if quick else 50.0,
         "goal_m": [0.0, 0.0],
         "starts": 3 if quick else 10,
-        "terrains": 1 if quick else 12,
+        "terrains": 1 if quick else 8,
         "search": {"iterations": 5000},
     }
     return ReachSpec.from_mapping(basic | varied)
