@@ -23,7 +23,7 @@ from rich.progress import track
 
 from lpet_sim.outputs import whole_file
 from lpet_sim.planning.mobility_map import map_mobility
-from lpet_sim.planning.reach import Reacher
+from lpet_sim.planning.reach import ROCKS, Reacher
 from lpet_sim.planning.reach_figures import draw_rates
 from lpet_sim.planning.reach_result import RateResult, ReachabilityReport
 from lpet_sim.planning.reach_run import run_reach
@@ -44,7 +44,7 @@ COLUMNS: Final = (
 )
 COUNTS: Final = (
     *("starts", "reachable", "undecided", "unreachable"),
-    *("touching", "reached_longer", "disc_there"),
+    *("touching", "reached_longer", "walled", "disc_there"),
 )
 ROUGH: Final = {
     "name": "rough",
@@ -106,7 +106,11 @@ def check_terrain(case: Case, spec: ReachSpec) -> Row:
         if start.path_m:
             row["touching"] += bool(touched(start.path, rocks, spec.mobility))
         if start.outcome == "unreachable":
-            row["disc_there"] += disc_gets_there(start.start_m, rocks, spec)
+            # That map knows no slopes.
+            row["walled"] += start.reason == ROCKS
+            row["disc_there"] += start.reason == ROCKS and disc_gets_there(
+                start.start_m, rocks, spec
+            )
             row["reached_longer"] += any(
                 search_straights(
                     here, start.start_m, goal, LONGER * spec.search.iterations, 12.0, 7
@@ -149,6 +153,7 @@ def checks_table(totals: list[Row]) -> list[str]:
         "undecided": "starts left undecided",
         "unreachable": "starts called unreachable",
         "reached_longer": f"of them reached by a search {LONGER} times as long",
+        "walled": "of those called unreachable walled in by rocks",
         "disc_there": "of them from which a disc 4 cm larger than the inscribed one gets to the "
         "goal on another map",
     }

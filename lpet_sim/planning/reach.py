@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lpet_sim.errors import BlockedPlaceError
+from lpet_sim.errors import BlockedPlaceError, PlanningError
 from lpet_sim.planning.clearance import Ground, Point
 from lpet_sim.planning.map_path import bridges_of, length_of, wave_from
 from lpet_sim.planning.mobility_map import Bools, MobilityMap, map_mobility, regions
@@ -16,6 +16,7 @@ from lpet_sim.planning.path_measures import measure_path
 from lpet_sim.planning.reach_result import Outcome, StartResult, TerrainResult
 from lpet_sim.planning.reach_spec import Case, ReachSpec
 from lpet_sim.planning.search import Pose, search_curves, search_straights
+from lpet_sim.progress import Progress, silent, track
 from lpet_sim.recording.arrays import Ints
 from lpet_sim.rng import stream
 from lpet_sim.terrain.terrain import build_terrain
@@ -32,22 +33,23 @@ BUDGET = "no way found within the budget"
 _DRAWS = 2000
 _GOAL_HEADINGS = 8
 _PLACES_SEARCHED = 3
-_DIGITS = 4
+_DIGITS = 6
 
 
-def reach_on(case: Case, spec: ReachSpec) -> TerrainResult:
+def reach_on(case: Case, spec: ReachSpec, progress: Progress = silent) -> TerrainResult:
     """Build one terrain of a study and find out from which starts its goal can be reached.
 
     Args:
         case: Which terrain.
         spec: The study.
+        progress: Called with the fraction of the starts done.
 
     Raises:
         LpetError: The terrain cannot be built or mapped.
     """
     began_s = time.process_time()
     ground = build_terrain(case.terrain, case.seed)
-    found = reach_from_all(ground, spec, case.seed)
+    found = reach_from_all(ground, spec, case.seed, progress)
     starts = tuple(_measured(start, ground, spec) for start in found)
     took_s = time.process_time() - began_s
     return TerrainResult(case.abundance, case.factor, case.index, case.seed, took_s, starts)
@@ -60,15 +62,19 @@ def _measured(start: StartResult, ground: Ground, spec: ReachSpec) -> StartResul
     return replace(start, measures=measure_path(start.path, ground, spec.mobility))
 
 
-def reach_from_all(ground: Ground, spec: ReachSpec, seed: int) -> list[StartResult]:
+def reach_from_all(
+    ground: Ground, spec: ReachSpec, seed: int, progress: Progress = silent
+) -> list[StartResult]:
     """Find out from which starts a goal can be reached on given ground.
 
     Args:
         ground: The terrain.
         spec: The study; its terrain is not looked at.
         seed: Of the random starts and of the searches.
+        progress: Called with the fraction of the starts done.
     """
-    return Reacher(map_mobility(ground, spec.box, spec.mobility, spec.cell_m), spec, seed).all()
+    here = map_mobility(ground, spec.box, spec.mobility, spec.cell_m)
+    return Reacher(here, spec, seed).all(progress)
 
 
 class Reacher:
@@ -95,10 +101,11 @@ class Reacher:
         """One place to turn at within the goal for each group of joined regions [m]."""
         return list(self._place_of.values())
 
-    def all(self) -> list[StartResult]:
+    def all(self, progress: Progress = silent) -> list[StartResult]:
         """Answer for the given starts, then for the random ones."""
         places = [*self._spec.starts_m, *self.random_starts()]
-        return [self.reach(start, number) for number, start in enumerate(places)]
+        answers = (self.reach(start, number) for number, start in enumerate(places))
+        return list(track(answers, len(places), progress))
 
     def random_starts(self) -> list[Point]:
         """Draw the random starts."""
@@ -134,17 +141,32 @@ class Reacher:
         return places
 
     def _random_start(self, rng: np.random.Generator) -> Point:
-        """Draw one; where no place of the ring will do, the last draw stays and counts as it is."""
-        box, ring, goal = self._spec.box, self._spec.start_distances_m, self._spec.goal_m
-        start = goal
+        """Draw one; where the rover can stand at no place drawn, the last one counts as it is."""
+        start: Point | None = None
         for _ in range(_DRAWS):
-            x, y = rng.uniform((box.x_min, box.y_min), (box.x_max, box.y_max)).tolist()
-            if ring is not None and not ring[0] <= math.dist((x, y), goal) <= ring[1]:
-                continue
-            start = (x, y)
-            if not self._spec.starts_stand or self.map.can_turn(start):
-                break
+            drawn = self._draw(rng)
+            if drawn is not None:
+                start = drawn
+                if not self._spec.starts_stand or self.map.can_turn(drawn):
+                    break
+        if start is None:
+            raise PlanningError(
+                "hardly a place of the ring start_distances_m lies in the square; bring it nearer "
+                "to the goal, or enlarge size_m"
+            )
         return start
+
+    def _draw(self, rng: np.random.Generator) -> Point | None:
+        """Draw a place evenly from the square, or from the ring; None where that is outside."""
+        box, ring, goal = self._spec.box, self._spec.start_distances_m, self._spec.goal_m
+        if ring is None:
+            x, y = rng.uniform((box.x_min, box.y_min), (box.x_max, box.y_max)).tolist()
+            return x, y
+        radius = math.sqrt(rng.uniform(ring[0] ** 2, ring[1] ** 2))
+        angle = rng.uniform(-math.pi, math.pi)
+        x, y = goal[0] + radius * math.cos(angle), goal[1] + radius * math.sin(angle)
+        inside = box.x_min <= x <= box.x_max and box.y_min <= y <= box.y_max
+        return (x, y) if inside else None
 
     def _blocked(self, start: Point) -> str:
         """Say why even the inscribed disc cannot get to the goal; empty where it may."""
@@ -203,7 +225,7 @@ class Reacher:
         )
         if not len(poses):
             return StartResult(start, "undecided", BUDGET)
-        path = tuple(tuple(row) for row in np.round(poses, _DIGITS + 1).tolist())
+        path = tuple(tuple(row) for row in np.round(poses, _DIGITS).tolist())
         length = float(np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1).sum())
         return StartResult(start, "reachable", "", "ompl", path, length)
 

@@ -35,7 +35,7 @@ def run_reach(
         seed: Any integer; the same spec and seed give the same results, whatever the workers.
         folder: Where to keep the results.
         workers: Processes.
-        progress: Called with the fraction of the terrains done.
+        progress: Called with the fraction of the terrains done, or of one terrain's starts.
 
     Returns:
         What was found; its summary stands in ``reach.json``.
@@ -49,7 +49,8 @@ def run_reach(
     output_folder(folder / _FOLDER)
     kept = {case.key: _read(case, spec, folder) for case in cases}
     done: dict[str, TerrainResult] = {key: one for key, one in kept.items() if one is not None}
-    for case, result in _run([case for case in cases if case.key not in done], spec, workers):
+    to_do = [case for case in cases if case.key not in done]
+    for case, result in _run(to_do, spec, workers, progress):
         _write(result, case, spec, folder)
         done[case.key] = result
         progress(len(done) / len(cases))
@@ -73,10 +74,14 @@ def _check_terrains(cases: tuple[Case, ...]) -> None:
             build_terrain(case.terrain, case.seed)
 
 
-def _run(cases: list[Case], spec: ReachSpec, workers: int) -> Iterator[tuple[Case, TerrainResult]]:
+def _run(
+    cases: list[Case], spec: ReachSpec, workers: int, progress: Progress
+) -> Iterator[tuple[Case, TerrainResult]]:
     if workers == 1 or len(cases) <= 1:
+        # A single terrain may take a minute: its starts move the bar.
+        within = progress if len(cases) == 1 else silent
         for case in cases:
-            yield case, reach_on(case, spec)
+            yield case, reach_on(case, spec, within)
         return
     # A forked process would share the locks of the planner's and the compiler's threads.
     context = multiprocessing.get_context("spawn")

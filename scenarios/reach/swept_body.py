@@ -136,13 +136,17 @@ def disc_gets_there(start: tuple[float, float], rocks: Rocks, spec: ReachSpec) -
     fits = (rocks.height_m <= mobility.belly_height_m) & (
         2.0 * rocks.reach_m <= mobility.straddle_width_m
     )
-    x = np.arange(spec.box.x_min, spec.box.x_max + pixel / 2, pixel)
+    # Rocks beyond the edge count, but the disc's middle does not go there.
+    beyond = math.ceil(2.0 / pixel)
+    x = spec.box.x_min + pixel * np.arange(-beyond, round(spec.size_m / pixel) + beyond + 1)
     blocked = np.zeros((len(x), len(x)), dtype=bool)
     for outline in rocks.select((rocks.height_m > mobility.climb_height_m) & ~fits).outlines():
         _fill(blocked, outline, x)
     away = distance_transform_edt(~blocked) * pixel if blocked.any() else np.full(blocked.shape, 99)
     reach = min(mobility.front_m, mobility.rear_m, mobility.half_width_m) + mobility.margin_m
-    region, _ = label(away >= reach + 0.04, np.ones((3, 3)))
+    inside = np.abs(x) <= spec.size_m / 2 + 1e-9
+    free = (away >= reach + 0.04) & inside[None] & inside[:, None]
+    region, _ = label(free, np.ones((3, 3)))
     row, column = (round((value - x[0]) / pixel) for value in (start[1], start[0]))
     goal = np.hypot(x[None] - spec.goal_m[0], x[:, None] - spec.goal_m[1]) <= spec.goal_radius_m
     here = region[row, column]

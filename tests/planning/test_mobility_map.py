@@ -12,10 +12,11 @@ from lpet_sim.planning.map_path import bridges_of, wave_from
 from lpet_sim.planning.mobility import MobilitySpec, kinds_of
 from lpet_sim.planning.mobility_kernels import least_distance
 from lpet_sim.planning.mobility_map import MobilityMap, map_mobility
+from lpet_sim.planning.reach_spec import ReachSpec
 from lpet_sim.planning.wave_kernels import UNSEEN
 from lpet_sim.rng import stream
 from lpet_sim.terrain.box import Box
-from scenarios.reach.swept_body import touched
+from scenarios.reach.swept_body import disc_gets_there, touched
 from tests.planning.flat_terrain import FlatTerrain
 
 BOX = Box.around(0.0, 0.0, 10.0)
@@ -77,6 +78,23 @@ def test_the_independent_test_finds_a_way_through_a_rock() -> None:
     assert touched(np.array([[0.0, 0.0], [4.0, 0.0]]), rocks, SPEC)
     assert touched(np.array([[0.0, 1.1], [4.0, 1.1]]), rocks, SPEC)
     assert touched(np.array([[0.0, 1.45], [4.0, 1.45]]), rocks, SPEC) == []
+
+
+def test_the_independent_disc_gets_through_a_gap_just_wider_than_it_and_no_narrower() -> None:
+    """Rocks of the shape library in a row; the gap is measured on their outlines."""
+    spec = ReachSpec.from_mapping(
+        {"terrain": {}, "size_m": 8.0, "goal_m": [3, 0], "starts_m": [[-3, 0]], "starts": 0}
+    )
+    below = [(0.0, -float(y), 1.6) for y in np.arange(1.4, 6.5, 0.4)]
+    above = [(0.0, float(y), 1.6) for y in np.arange(1.4, 6.5, 0.4)]
+    low, high = (FlatTerrain(row).rocks(spec.box.grown(4)).outlines() for row in (below, above))
+    gap = min(o[:, 1].min() for o in high) - max(o[:, 1].max() for o in low)
+    through = []
+    for wider in (-0.08, 0.08):
+        shift = 2 * (spec.mobility.inscribed_m + 0.04) + wider - gap
+        wall = FlatTerrain([*below, *((x, y + shift, d) for x, y, d in above)])
+        through.append(disc_gets_there((-3.0, 0.0), wall.rocks(spec.box.grown(4)), spec))
+    assert through == [False, True]
 
 
 def test_a_low_rock_is_passed_between_the_wheels_but_not_under_one() -> None:

@@ -301,7 +301,7 @@ def test_the_command_writes_its_tables_and_pictures(
     assert json.loads((out / "reach.json").read_text())["rates"][0]["starts"] == 4
 
 
-def test_a_goal_inside_a_rock_ends_the_command_with_one_sentence(tmp_path: Path) -> None:
+def test_a_goal_inside_a_rock_ends_the_study_with_one_sentence(tmp_path: Path) -> None:
     """Where no terrain of the study has room at the goal."""
     table = {"kind": "table", "rows": [
         {"diameter_min_m": 2.0, "diameter_max_m": 2.4, "count_per_m2": 0.03}
@@ -317,3 +317,17 @@ def test_a_goal_inside_a_rock_ends_the_command_with_one_sentence(tmp_path: Path)
 def test_every_study_of_the_scenarios_can_be_read(path: Path) -> None:
     """And its terrains can be laid out."""
     assert cases_of(ReachSpec.from_yaml(path), 0)
+
+
+def test_starts_of_a_ring_are_spread_over_it_evenly_and_can_be_stood_at() -> None:
+    """Half of them beyond the radius that halves its area."""
+    spec = _spec(
+        starts=200, starts_m=[], goal_m=[0, 0], start_distances_m=[3.0, 7.0], goal_radius_m=1.0
+    )
+    here = map_mobility(FlatTerrain(), spec.box, spec.mobility, spec.cell_m)
+    starts = Reacher(here, spec, 1).random_starts()
+    away = np.hypot(*np.array(starts).T)
+    assert away.min() >= 3.0
+    assert away.max() <= 7.0
+    assert np.mean(away > math.sqrt((9 + 49) / 2)) == pytest.approx(0.5, abs=0.12)
+    assert all(here.can_turn(start) for start in starts)
