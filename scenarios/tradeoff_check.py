@@ -51,16 +51,14 @@ class Setting:
         candidate: The sensor.
         predicted: Static prediction of the RMS position error over the distance.
         bound: RMS over the draws of the Cramer-Rao bound of what was really measured.
-        slam: RMS error of the SLAM filter.
-        frame_to_frame: RMS error of frame-to-frame vision.
-        failed: Runs of the SLAM filter that failed.
+        errors: RMS error of each estimator, the deciding one first.
+        failed: Runs of the deciding estimator that failed.
     """
 
     candidate: Candidate
     predicted: float
     bound: float
-    slam: float
-    frame_to_frame: float
+    errors: dict[str, float]
     failed: int
 
 
@@ -93,12 +91,11 @@ def settings_of(
     rows = []
     for i, candidate in enumerate(candidates):
         one = found[i]
-        lead, other = (one.rows[k]["variant"] for k in (0, 1))
-        held = [row["bound_m"] / row["path_m"] for row in one.of(lead)]
+        labels = dict.fromkeys(str(row["variant"]) for row in one.rows)
+        held = [row["bound_m"] / row["path_m"] for row in one.of(one.lead)]
         bound = math.sqrt(float(np.mean(np.square(held))))
-        errors = one.error_ratio(lead), one.error_ratio(other)
-        failed = one.efficiency.failed
-        rows.append(Setting(candidate, one.predicted_ratio, bound, *errors, failed))
+        errors = {label: one.error_ratio(label) for label in labels}
+        rows.append(Setting(candidate, one.predicted_ratio, bound, errors, one.efficiency.failed))
     return rows
 
 
@@ -118,41 +115,37 @@ def interval(x: Array, y: Array) -> tuple[float, float]:
 
 def lines_of(settings: Sequence[Setting]) -> list[str]:
     """Write the rank correlations, over all settings and over the best third."""
-    predicted, bound, slam, other = (
-        np.array([getattr(s, name) for s in settings])
-        for name in ("predicted", "bound", "slam", "frame_to_frame")
-    )
+    predicted = np.array([s.predicted for s in settings])
+    columns = {"Cramer-Rao bound": np.array([s.bound for s in settings])}
+    for label in settings[0].errors:
+        columns[label] = np.array([s.errors[label] for s in settings])
     third = max(3, len(settings) // 3)
-    by_prediction, by_truth = np.argsort(predicted)[:third], np.argsort(slam)[:third]
+    best = np.argsort(predicted)[:third]
     out = []
-    for name, y in (("SLAM filter", slam), ("Cramer-Rao bound", bound), ("frame-to-frame", other)):
+    for name, y in columns.items():
         low, high = interval(predicted, y)
+        own = np.argsort(y)[:third]
+        ratio = y / predicted
+        quartiles = ", ".join(f"{q:.2f}" for q in np.quantile(ratio, [0.25, 0.5, 0.75]))
         out.append(
             f"{name}: rank correlation with the prediction {rank_correlation(predicted, y):.3f} "
             f"[{low:.3f}, {high:.3f}] over {len(settings)} settings; "
-            f"{rank_correlation(predicted[by_prediction], y[by_prediction]):.3f} within the third "
-            f"that is predicted best, {rank_correlation(predicted[by_truth], y[by_truth]):.3f} "
-            "within the third in which the filter is best"
+            f"{rank_correlation(predicted[best], y[best]):.3f} within the third that is predicted "
+            f"best, {rank_correlation(predicted[own], y[own]):.3f} within its own best third; over "
+            f"the prediction: quartiles {quartiles}, at most {ratio.max():.2f}"
         )
-    ratio = slam / predicted
-    quartiles = np.quantile(ratio, [0.25, 0.5, 0.75])
-    out.append(
-        "SLAM filter over prediction: quartiles "
-        + ", ".join(f"{q:.2f}" for q in quartiles)
-        + f", range {ratio.min():.2f} to {ratio.max():.2f}"
-    )
     return out
 
 
 def write_table(settings: Sequence[Setting], path: Path) -> Path:
     """Write one row for each setting."""
-    figures = ("predicted", "bound", "slam", "frame_to_frame")
+    figures = ("predicted", "bound", *settings[0].errors)
     with whole_file(path) as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([*PARAMETERS, *(f"{name}_percent" for name in figures), "failed"])
         for s in settings:
             shown = [getattr(s.candidate, name) for name in PARAMETERS]
-            percent = [f"{100 * getattr(s, name):.5f}" for name in figures]
+            percent = [f"{100 * v:.5f}" for v in (s.predicted, s.bound, *s.errors.values())]
             short = [f"{v:.4f}" if isinstance(v, float) else v for v in shown]
             writer.writerow([*short, *percent, s.failed])
     return path
@@ -188,9 +181,9 @@ def main() -> None:
     for line in lines_of(settings):
         say(line)
     picture = folder / "agreement.png"
-    told_errors = {"SLAM filter": [s.slam for s in settings]}
-    told_errors["frame-to-frame"] = [s.frame_to_frame for s in settings]
-    save(plot_agreement([s.predicted for s in settings], told_errors), picture)
+    drawn = {"Cramer-Rao bound": [s.bound for s in settings]}
+    drawn |= {name: [s.errors[name] for s in settings] for name in settings[0].errors}
+    save(plot_agreement([s.predicted for s in settings], drawn), picture)
     wrote(write_table(settings, folder / "tradeoff_check.csv"), picture)
 
 
