@@ -21,7 +21,7 @@ from lpet_sim.terrain.figure_ground import ROCK, lit_colours, sample_ground, sav
 from lpet_sim.terrain.terrain import Terrain, build_terrain
 
 _NODES = 700
-_STRADDLED = "#8a5a44"
+_STRADDLED = "#f5efe6"
 _WAY = "#0b4f8a"
 _MARKS = {
     "reachable": ("o", "#2c7fb8", "reachable"),
@@ -100,9 +100,14 @@ def _sheet(size: tuple[float, float]) -> tuple[Figure, Axes]:
 
 def _draw_rocks(axes: Axes, terrain: Terrain, spec: ReachSpec) -> None:
     rocks = terrain.rocks(spec.box, spec.mobility.climb_height_m)
-    for which, colour in zip(kinds_of(rocks, spec.mobility), (ROCK, _STRADDLED), strict=True):
+    obstacles, straddled = kinds_of(rocks, spec.mobility)
+    for which, colour, label in (
+        (obstacles, ROCK, "obstacle"),
+        (straddled, _STRADDLED, "to straddle"),
+    ):
         outlines = rocks.select(which).outlines()
-        axes.add_collection(PolyCollection(outlines, facecolors=colour, linewidths=0.0))
+        style: dict[str, Any] = {"facecolors": colour, "linewidths": 0.0, "label": label}
+        axes.add_collection(PolyCollection(outlines, **style))
 
 
 def _draw_goal(axes: Axes, spec: ReachSpec) -> None:

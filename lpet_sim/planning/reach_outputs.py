@@ -36,8 +36,9 @@ def write_reach(
         if terrain.index == 0:
             paths.append(folder / f"map_{terrain.key}.png")
             draw_reach_map(terrain, cases[terrain.key], spec, paths[-1])
-    paths.append(folder / "rates.png")
-    draw_rates(report, paths[-1])
+    if len(report.rates) > 1:
+        paths.append(folder / "rates.png")
+        draw_rates(report, paths[-1])
     ranked = rank_worst(report, spec)
     saved = save_worst(ranked, spec.mobility, folder / WORST_FOLDER, worst)
     return ranked[:worst], paths + saved
