@@ -19,9 +19,9 @@ from lpet_sim import cli
 from lpet_sim.datasets import data_folder, data_path
 from lpet_sim.errors import LpetError
 from lpet_sim.recording.reader import read_recording
+from lpet_sim.study.spec import StudySpec
 from lpet_sim.sweep.simulate import simulate
 from lpet_sim.sweep.sweep_plan import expand
-from lpet_sim.study.spec import StudySpec
 from lpet_sim.sweep.sweep_spec import SweepSpec
 from lpet_sim.sweep.traverse import TraverseSpec
 from tests.command import TINY
