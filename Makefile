@@ -41,6 +41,8 @@ experiments: opengl
 	$(BIN)/python -m scenarios.hundred_metres
 	$(BIN)/python -m scenarios.real_data
 	$(BIN)/python -m scenarios.kitti_prediction
+	$(BIN)/python -m scenarios.reach_checks
+	$(BIN)/python -m scenarios.tradeoff_check
 
 paper: $(STAMP) ## the paper's experiment: hours; goes on where it was
 	$(BIN)/python -m scenarios.paper_experiment
