@@ -123,7 +123,7 @@ class SlamRun:
         self._threshold = chi_square_threshold(3, spec.gate_probability)
         self._standing = spec.anchors is not None
         self._rested = self._moved = 0
-        self._unfixed = np.zeros(6)
+        self._unfixed, self._moved_on = np.zeros(6), np.zeros(6)
         self._log: dict[str, list[float]] = {name: [] for name in LOGGED}
 
     def advance(self, step: Step) -> None:
@@ -132,7 +132,7 @@ class SlamRun:
         step = replace(step, noise=scale * step.noise, drift_px=scale * step.drift_px)
         self.state.advance(step)
         twist = step.twist
-        self._unfixed = self._unfixed + np.abs(twist)
+        self._unfixed, self._moved_on = self._unfixed + np.abs(twist), self._moved_on + twist
         if self._standing and self._spec.anchors is not None:
             self._watch_standstill(twist, self._spec.anchors)
 
@@ -164,7 +164,7 @@ class SlamRun:
         blamed = seen.slots[~accepted] if 2 * count > len(seen) else seen.slots[:0]
         self.landmarks.count_image(seen.slots[accepted], blamed)
         if count >= self._spec.sightings_min:
-            self._unfixed = np.zeros(6)
+            self._unfixed, self._moved_on = np.zeros(6), np.zeros(6)
         new, dropped = self._renew(landmark_id[~known], stereo_px[~known], variance[~known])
         self._note(
             sightings=len(slots),
@@ -193,7 +193,7 @@ class SlamRun:
     def _gated(self, seen: Innovations) -> tuple[bool, Innovations, Bools]:
         """Tell whether odometry slipped, and which sightings fit by themselves."""
         fits = self.state.squared_distances(seen) <= self._threshold
-        if len(seen) < self._spec.sightings_min or fits.mean() >= self._spec.slip_share:
+        if len(seen) < self._spec.sightings_min or not self._slipped(seen, fits):
             return False, seen, fits
         self.state.disturb(self._slip_noise())
         fits = self.state.squared_distances(seen) <= self._threshold
@@ -201,6 +201,19 @@ class SlamRun:
             seen = relinearised(self.state, seen, seen.take(fits), self._spec.slip_rounds)
             fits = self.state.squared_distances(seen) <= self._threshold
         return True, seen, fits
+
+    def _slipped(self, seen: Innovations, fits: Bools) -> bool:
+        """Tell whether too few sightings fit, of those that would tell if the rover had stood.
+
+        A far landmark fits whatever the wheels say: where its sighting would stay within its noise
+        had the rover not moved since the last image that fitted, it is not asked.
+        """
+        if fits.all():
+            return False
+        moved_px = seen.moved_by(self.state.directions(self._moved_on[None])[0])
+        tells = np.einsum("mi,mi->m", moved_px, moved_px) > self._threshold * seen.variance
+        asked = fits[tells] if tells.sum() >= self._spec.sightings_min else fits
+        return bool(asked.mean() < self._spec.slip_share)
 
     def _taken_in(self, seen: Innovations, fits: Bools) -> tuple[Bools, float]:
         """Correct the state by the sightings that fit together; gives which, and their NIS."""

@@ -96,7 +96,7 @@ class SlamState:
             F[:3, 3:] = -hat(self.p - before)
             gaussian_blocks.move_block(self.P, F, np.zeros((POSE, POSE)))
         self._predicted = self.R, self.p
-        gaussian_blocks.carry(self.P, self._directions(step.lasting), POSE)
+        gaussian_blocks.carry(self.P, self.directions(step.lasting), POSE)
         self.disturb(step.noise)
         if step.drift_px > 0.0:
             self._drift(step.drift_px * math.sqrt(float(np.linalg.norm(twist[:3]))))
@@ -114,9 +114,9 @@ class SlamState:
         Args:
             noise: What unit noises do to it, Shape (k, 6).
         """
-        gaussian_blocks.add_noise(self.P, self._directions(noise))
+        gaussian_blocks.add_noise(self.P, self.directions(noise))
 
-    def _directions(self, moves: Array) -> Array:
+    def directions(self, moves: Array) -> Array:
         """Give what right perturbations of the pose, Shape (k, 6), are in the state, (k, n)."""
         B_T = np.zeros((len(moves), self.landmarks.rows))
         turn = np.ascontiguousarray(moves[:, 3:] @ self.R.T)

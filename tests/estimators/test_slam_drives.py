@@ -21,7 +21,7 @@ from lpet_sim.evaluation.consistency import anees
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.estimate import Estimate
-from lpet_sim.recording.streams import Measurements
+from lpet_sim.recording.streams import Measurements, SightingStream
 from lpet_sim.rng import stream
 from tests.estimators.slam_worlds import FORMS, dense, live, spec
 
@@ -69,6 +69,39 @@ def test_without_a_slip_none_is_flagged() -> None:
     assert not Slam().estimate(given).diagnostics["slipped"].any()
     blind = Slam(SlamSpec(slip_share=0.0)).estimate(slipped(given, 1.0))
     assert nees(blind, drive.poses(), SLIP) > 1e3
+
+
+def under_a_skyline(given: Measurements, poses: SE3, seed: int) -> Measurements:
+    """Add sixty landmarks on a skyline, half a kilometre off, to the sightings of each image."""
+    seen, cameras = given.sightings, given.calibration.stereo
+    assert seen is not None and cameras is not None
+    rng, eyes = stream(seed, "skyline"), poses @ cameras.T_body_camera.se3()
+    bearing = rng.uniform(-0.4, 0.4, 60)
+    ahead = np.column_stack([500.0 * np.sin(bearing), np.full(60, -40.0), 500.0 * np.cos(bearing)])
+    p_world = np.asarray(eyes[0] @ ahead)
+    ids, rows = [], []
+    for k in range(len(seen)):
+        far = cameras.project(eyes[k].inverse() @ p_world)
+        far = far + cameras.sigma_px * rng.standard_normal(far.shape)
+        ids.append(np.concatenate([seen.landmark_id[seen.rows(k)], 1_000_000 + np.arange(60)]))
+        rows.append(np.concatenate([seen.stereo_px[seen.rows(k)], far]))
+    offsets = seen.offsets + 60 * np.arange(len(seen) + 1)
+    px = np.concatenate(rows)
+    sigma = np.full(len(px), cameras.sigma_px)
+    both = SightingStream(seen.t_ns.copy(), offsets, np.concatenate(ids), px, sigma)
+    return replace(given, sightings=both)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_slip_under_a_skyline_is_flagged(form: str) -> None:
+    """Most sightings are of far landmarks, which fit whatever the wheels say."""
+    drive = Drive(40, visible=25, sightings=20)
+    given = under_a_skyline(drive.measurements(0), drive.poses(), 0)
+    assert not Slam(spec(form)).estimate(given).diagnostics["slipped"].any()
+    found = Slam(spec(form)).estimate(slipped(given, 0.5))
+    assert np.flatnonzero(found.diagnostics["slipped"]).tolist() == [SLIP]
+    for image in (SLIP, SLIP + 1, len(drive.poses()) - 1):
+        assert nees(found, drive.poses(), image) < THREE_SIGMA
 
 
 def misplaced(given: Measurements, image: int, count: int) -> tuple[Measurements, list[int]]:
