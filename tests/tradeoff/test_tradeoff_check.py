@@ -11,7 +11,7 @@ def test_prediction_and_simulation_are_compared_on_a_short_drive(tmp_path: Path)
     """Four settings: rank correlations, a table and a picture."""
     printed = run_quick("tradeoff_check.py", tmp_path, "--out", str(tmp_path / "check"))
     assert "Cramer-Rao bound: rank correlation with the prediction" in printed
-    assert "slam_noticing: rank correlation" in printed
+    assert "unobservable-invariant: rank correlation" in printed
     table, picture = written_by(printed)
     assert len(table.read_text().splitlines()) == 5
     assert picture.stat().st_size > 10_000
