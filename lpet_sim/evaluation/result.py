@@ -97,6 +97,7 @@ def evaluate(
     truth: Truth,
     spec: EvaluationSpec | None = None,
     anchor_t_ns: int | None = None,
+    last_image_t_ns: int | None = None,
 ) -> RunResult:
     """Score an estimate against the truth, unaligned.
 
@@ -110,6 +111,8 @@ def evaluate(
         anchor_t_ns: Score from here on only, with the estimate moved as a whole onto the true
             pose at its first time from here [ns]. The covariances then no longer belong to the
             errors, and no NEES is given.
+        last_image_t_ns: Time of the last image [ns]: an estimate that ends with it covers the
+            traverse, however far the drive then still went. None: it must reach the truth's end.
 
     Returns:
         The score.
@@ -122,7 +125,7 @@ def evaluate(
     if not len(finite.trajectory):
         return failed(estimate.name, NOT_FINITE, "no pose of the estimate is finite")
     series = _series(finite, truth, anchor_t_ns)
-    distance_m, completion = _completion(series, truth.trajectory)
+    distance_m, completion = _completion(series, truth.trajectory, last_image_t_ns)
     begin = series.t_ns[0]
     scored = Trajectory(
         finite.trajectory.t_ns[finite.trajectory.t_ns >= begin],
@@ -179,7 +182,9 @@ def _series(estimate: Estimate, truth: Truth, anchor_t_ns: int | None) -> ErrorS
     return replace(series, nees=nees(series.xi, covariance))
 
 
-def _completion(series: ErrorSeries, truth: Trajectory) -> tuple[float, float]:
+def _completion(
+    series: ErrorSeries, truth: Trajectory, last_image_t_ns: int | None
+) -> tuple[float, float]:
     """Give the length of the scored traverse [m] and the share that the estimate covers.
 
     A traverse that does not move is covered by the share of its time.
@@ -187,6 +192,8 @@ def _completion(series: ErrorSeries, truth: Trajectory) -> tuple[float, float]:
     driven = distance_driven_m(truth)
     begin = np.interp(series.t_ns[0], truth.t_ns, driven) - series.distance_m[0]
     total = float(driven[-1] - begin)
+    if last_image_t_ns is not None and series.t_ns[-1] == last_image_t_ns:
+        return total, 1.0
     if total > 0:
         return total, float(series.distance_m[-1] / total)
     span = int(truth.t_ns[-1] - truth.t_ns[0])

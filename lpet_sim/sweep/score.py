@@ -127,7 +127,12 @@ def score_recording(path: Path, from_s: float | None = None) -> Score:
     if not estimates:
         raise RecordingError(f"{path} holds no estimates; run 'lpet estimate {path}' first")
     anchor_t_ns = None if from_s is None else round(from_s * NS_PER_S)
-    results = tuple(evaluate(e, recording.truth, anchor_t_ns=anchor_t_ns) for e in estimates)
+    sightings = recording.measurements.sightings
+    last = None if sightings is None or not len(sightings) else int(sightings.t_ns[-1])
+    results = tuple(
+        evaluate(e, recording.truth, anchor_t_ns=anchor_t_ns, last_image_t_ns=last)
+        for e in estimates
+    )
     split = attribute_dead_reckoning(recording)
     return Score(recording, estimates, results, split, _match_slips(recording, estimates))
 

@@ -87,6 +87,12 @@ class Scene:
     truth: Truth
     images: int
 
+    @property
+    def last_image_t_ns(self) -> int | None:
+        """Time of the last image pair that was sighted [ns]."""
+        sightings = self.measurements.sightings
+        return None if sightings is None or not len(sightings) else int(sightings.t_ns[-1])
+
 
 @dataclass(frozen=True)
 class _Outcome:
@@ -167,7 +173,9 @@ def _outcome(run: PlannedRun, scene: Scene, settings: RunSettings) -> _Outcome:
         with time_limit(settings.redo.time_limit_s):
             estimate = estimator.estimate(scene.measurements)
         spent_s = time.perf_counter() - begin_s
-        return _Outcome(evaluate(estimate, scene.truth, settings.evaluation), spent_s, estimate)
+        last = scene.last_image_t_ns
+        result = evaluate(estimate, scene.truth, settings.evaluation, last_image_t_ns=last)
+        return _Outcome(result, spent_s, estimate)
     except TimeLimitError:
         kind, text = TIMEOUT, f"stopped after {settings.redo.time_limit_s:g} s"
     except BrokenFilterError as error:

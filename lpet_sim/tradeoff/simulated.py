@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -170,15 +170,8 @@ def _plan(
                     PlannedRun(digest([key, v.estimator, v.spec]), v.estimator, v.spec)
                     for v in variants
                 )
-                held = replace(settings, evaluation=_evaluation(candidate, data_set.path_m))
-                told = (Path(data_set.path), candidate, spec.site, draw, runs, held, bounds)
+                told = (Path(data_set.path), candidate, spec.site, draw, runs, settings, bounds)
                 yield _Planned(index, data_set, variants, Drive(key, *told))
-
-
-def _evaluation(candidate: Candidate, path_m: float) -> EvaluationSpec:
-    """Let the estimate end with the last image, up to an interval before the drive's end."""
-    whole = EvaluationSpec().min_completion
-    return EvaluationSpec(min_completion=max(0.0, whole - candidate.image_interval_m / path_m))
 
 
 def _key(

@@ -99,6 +99,19 @@ def test_an_estimate_that_ends_early_is_incomplete_and_fails() -> None:
     assert not Requirement().check(result).passed
 
 
+def test_an_estimate_that_ends_with_the_last_image_is_complete() -> None:
+    """The drive went on by 1.5 % after it; one that ends an image earlier is not complete."""
+    truth = straight(20.0, 201)
+    cut = Trajectory(truth.t_ns[:198].copy(), truth.T_world_body[:198])
+    last = int(cut.t_ns[-1])
+    assert evaluate(as_estimate(cut), as_truth(truth)).failure == "incomplete"
+    result = evaluate(as_estimate(cut), as_truth(truth), last_image_t_ns=last)
+    assert result.completion == 1.0 and result.failure is None
+    shorter = Trajectory(truth.t_ns[:197].copy(), truth.T_world_body[:197])
+    early = evaluate(as_estimate(shorter), as_truth(truth), last_image_t_ns=last)
+    assert early.failure == "incomplete"
+
+
 def test_poses_that_are_not_finite_end_the_estimate() -> None:
     """The part before is scored, the failure is named."""
     truth = straight(20.0, 201)
