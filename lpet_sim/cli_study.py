@@ -41,7 +41,7 @@ def study(
     except KeyboardInterrupt:
         say("stopped: the same command goes on from here")
         raise
-    print_tables(sheet.to_table() for sheet in study_sheets(result, verdict))
+    print_tables(sheet.to_table() for sheet in study_sheets(result, verdict, True))
     for stage in result.stages:
         say(f"{stage.name}: {stage.path} ({stage.state})")
     wrote(*paths)

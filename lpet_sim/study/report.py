@@ -102,14 +102,22 @@ def _localized(outcomes: tuple[AlgorithmOutcome, ...]) -> str:
     )
 
 
-def study_sheets(result: StudyResult, verdict: StudyVerdict) -> list[Sheet]:
-    """Make the tables of a study, the verdict first."""
+def study_sheets(
+    result: StudyResult, verdict: StudyVerdict, best_lines: bool = False
+) -> list[Sheet]:
+    """Make the tables of a study, the verdict first.
+
+    Args:
+        result: The study.
+        verdict: Its verdict.
+        best_lines: Give the requirement line by line for the best algorithm only.
+    """
     reach = reach_sheet(result.reach)
     if result.rows is None or result.sensor is None or verdict.best is None:
         return [reach]
     return [
         verdict_sheet(verdict.outcomes),
-        line_sheet(verdict.outcomes),
+        line_sheet(verdict.outcomes[:1] if best_lines else verdict.outcomes),
         reach,
         sensor_sheet(result.sensor.candidate),
         drive_sheet(result.rows, verdict.best),
