@@ -22,6 +22,7 @@ from lpet_sim.study.runs import study_rows, sweep_of
 from lpet_sim.study.spec import StudySpec
 from lpet_sim.study.stages import Products, Stage, StageResult, run_stages
 from lpet_sim.sweep.sweep_data import DataSet, find_data_sets, prepare_data_sets
+from lpet_sim.sweep.sweep_plan import expand
 from lpet_sim.sweep.sweep_pool import Pool
 from lpet_sim.sweep.sweep_run import TABLE, run_sweep
 from lpet_sim.sweep.sweep_spec import DataSetsSpec
@@ -94,9 +95,13 @@ def run_study(spec: StudySpec, folder: Path, seed: int, hands: Hands) -> StudyRe
         hands: Workers and progress.
 
     Raises:
-        LpetError: The goal lies in a rock, the space of sensors is empty, a product that was put
-            in place of a stage's own cannot be read, or the folder cannot be written.
+        LpetError: There is no such algorithm, the goal lies in a rock, the space of sensors is
+            empty, a product that was put in place of a stage's own cannot be read, or the folder
+            cannot be written.
     """
+    # What cannot be built is told before hours are spent.
+    for variants in (spec.algorithms, spec.sensors.estimators):
+        expand(variants)
     home = output_folder(folder).resolve()
     first = [_reachability(spec, seed, hands)]
     (reached,) = run_stages(first, home)

@@ -164,6 +164,8 @@ def test_a_goal_in_a_rock_and_an_empty_space_are_told_in_a_sentence(tmp_path: Pa
     empty = TINY | {"sensors": {"space": {"baseline_m": []}}}
     ended = _study(tmp_path, empty)
     assert ended.code == 2 and "is empty" in ended.err
+    unknown = _study(tmp_path, TINY | {"algorithms": [{"estimator": "magic"}]})
+    assert unknown.code == 2 and "frame_to_frame" in unknown.err
     assert not (tmp_path / "out").exists()
     terrain = build_terrain(load_terrain_spec("exomars"), terrain_seed(0, 0))
     rocks = terrain.rocks(Box.around(0.0, 0.0, 8.0), 0.6)
