@@ -15,18 +15,13 @@ from lpet_sim.planning.mobility import MobilitySpec
 from lpet_sim.rng import stream
 from lpet_sim.spec import Spec, read_yaml
 from lpet_sim.terrain.box import Box
-from lpet_sim.terrain.load import load_terrain_spec, with_local_soils
+from lpet_sim.terrain.load import named_terrain, terrain_beside
 from lpet_sim.terrain.rock_spec import RockAbundanceSpec
 from lpet_sim.terrain.spec import TerrainSpec
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Place = tuple[float, float]
-
-
-def _named_terrain(value: object) -> object:
-    """Let a terrain be a preset's name or a file in place of its fields."""
-    return load_terrain_spec(value) if isinstance(value, str) else value
 
 
 class SearchSpec(Spec):
@@ -68,7 +63,7 @@ class ReachSpec(Spec):
     """
 
     name: str = "reach"
-    terrain: Annotated[TerrainSpec, BeforeValidator(_named_terrain)]
+    terrain: Annotated[TerrainSpec, BeforeValidator(named_terrain)]
     size_m: Annotated[float, Field(ge=5.0, le=1000.0)] = 200.0
     goal_m: Place
     goal_radius_m: NotNegative = 3.0
@@ -92,7 +87,7 @@ class ReachSpec(Spec):
         """
         mapping, folder = read_yaml(Path(path)), Path(path).parent
         if isinstance(mapping, dict) and "terrain" in mapping:
-            mapping |= {"terrain": _beside(mapping["terrain"], folder)}
+            mapping |= {"terrain": terrain_beside(mapping["terrain"], folder)}
         return cls.from_mapping(mapping, source=str(path))
 
     @property
@@ -130,12 +125,6 @@ class ReachSpec(Spec):
 
     def _is_varied(self, name: str) -> bool:
         return bool(getattr(self, name)) and getattr(self, name) != (1.0,)
-
-
-def _beside(terrain: object, folder: Path) -> object:
-    if not isinstance(terrain, str):
-        return with_local_soils(terrain, folder)
-    return str(folder / terrain) if (folder / terrain).is_file() else terrain
 
 
 def _check_inside(what: str, xy: Place, half_m: float) -> None:

@@ -17,7 +17,7 @@ from lpet_sim.rover.spec import DriveSpec, RoverSpec
 from lpet_sim.sensors.suite import SensorSuiteSpec
 from lpet_sim.soil.load import soil_beside
 from lpet_sim.spec import Spec, read_yaml
-from lpet_sim.terrain.load import load_terrain_spec, with_local_soils
+from lpet_sim.terrain.load import named_terrain, terrain_beside
 from lpet_sim.terrain.spec import TerrainSpec
 from lpet_sim.terrain.terrain import Terrain
 from lpet_sim.vision.spec import FrontEndSpec
@@ -29,11 +29,6 @@ _WAYS_OUT = (
     "move the waypoint, let it be moved (move_within_m), raise route.obstacle_height_m, or drive "
     "straight on (route: null)"
 )
-
-
-def _named_terrain(value: object) -> object:
-    """Let a terrain be a preset's name or a file in place of its fields."""
-    return load_terrain_spec(value) if isinstance(value, str) else value
 
 
 class ImagesSpec(Spec):
@@ -70,7 +65,7 @@ class TraverseSpec(Spec):
     """
 
     name: str = "traverse"
-    terrain: Annotated[TerrainSpec, BeforeValidator(_named_terrain)]
+    terrain: Annotated[TerrainSpec, BeforeValidator(named_terrain)]
     rover: RoverSpec = RoverSpec()
     drive: DriveSpec
     route: RouteSpec | None = RouteSpec()
@@ -99,15 +94,9 @@ def files_beside(mapping: object, folder: Path) -> object:
         folder: Where its YAML file lies.
     """
     if isinstance(mapping, dict) and "terrain" in mapping:
-        mapping |= {"terrain": _beside(mapping["terrain"], folder)}
+        mapping |= {"terrain": terrain_beside(mapping["terrain"], folder)}
     _find_rock(mapping, folder)
     return mapping
-
-
-def _beside(terrain: object, folder: Path) -> object:
-    if not isinstance(terrain, str):
-        return with_local_soils(terrain, folder)
-    return str(folder / terrain) if (folder / terrain).is_file() else terrain
 
 
 def _find_rock(mapping: object, folder: Path) -> None:

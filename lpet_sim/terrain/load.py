@@ -41,6 +41,18 @@ def load_terrain_spec(name_or_path: str | Path) -> TerrainSpec:
     return _with_local_dem(spec, folder)
 
 
+def named_terrain(value: object) -> object:
+    """Let a terrain be a preset's name or a file in place of its fields; for a spec's validator."""
+    return load_terrain_spec(value) if isinstance(value, str) else value
+
+
+def terrain_beside(terrain: object, folder: Path) -> object:
+    """Find the files that a terrain as read from YAML names, where they lie in a folder."""
+    if not isinstance(terrain, str):
+        return with_local_soils(terrain, folder)
+    return str(folder / terrain) if (folder / terrain).is_file() else terrain
+
+
 def with_local_soils(mapping: object, folder: Path) -> object:
     """Give a terrain's mapping with the soils that are named by a file in a folder found there.
 

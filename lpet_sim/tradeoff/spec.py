@@ -12,17 +12,13 @@ from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec
 from lpet_sim.sensors.wheels import WheelOdometrySpec
 from lpet_sim.spec import Spec, read_yaml
 from lpet_sim.sweep.sweep_spec import VariantSpec
-from lpet_sim.terrain.load import load_terrain_spec, with_local_soils
+from lpet_sim.terrain.load import named_terrain, terrain_beside
 from lpet_sim.terrain.spec import TerrainSpec
 from lpet_sim.tradeoff.proxies import ProxySpec
 from lpet_sim.tradeoff.space import SamplingSpec, SensorSpaceSpec
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
-
-
-def _named_terrain(value: object) -> object:
-    return load_terrain_spec(value) if isinstance(value, str) else value
 
 
 class SiteSpec(Spec):
@@ -42,7 +38,7 @@ class SiteSpec(Spec):
         wheels: Wheel odometry.
     """
 
-    terrain: Annotated[TerrainSpec, BeforeValidator(_named_terrain)]
+    terrain: Annotated[TerrainSpec, BeforeValidator(named_terrain)]
     speed_mps: Positive = 100.0 / 3600.0
     distance_m: Annotated[float, Field(ge=2.0)] = 100.0
     standstill_s: NotNegative = 36.0
@@ -179,16 +175,10 @@ def _files_in(mapping: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Give the parts of a trade-off that may name files, with the files found."""
     found: dict[str, Any] = {}
     if isinstance(site := mapping.get("site"), dict) and "terrain" in site:
-        found["site"] = site | {"terrain": _terrain_beside(site["terrain"], folder)}
+        found["site"] = site | {"terrain": terrain_beside(site["terrain"], folder)}
     if isinstance(runs := mapping.get("simulation"), dict):
         globs = runs.get("recordings")
         if isinstance(globs, list):
             globs = [str(folder / glob) if isinstance(glob, str) else glob for glob in globs]
             found["simulation"] = runs | {"recordings": globs}
     return found
-
-
-def _terrain_beside(terrain: object, folder: Path) -> object:
-    if not isinstance(terrain, str):
-        return with_local_soils(terrain, folder)
-    return str(folder / terrain) if (folder / terrain).is_file() else terrain
