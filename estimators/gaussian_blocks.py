@@ -192,7 +192,42 @@ def mirror_lower(P: Array) -> None:
                     P[j, i] = P[i, j]
 
 
-def update_in_place(P: Array, HP: Array, S: Array, innovation: Array) -> tuple[Array, float]:
+def square_root(S: Array) -> Array:
+    """Give the lower Cholesky factor L of a covariance, ``S = L L^T``, Shape (m, m).
+
+    What stands above the diagonal of L means nothing.
+
+    Raises:
+        BrokenFilterError: S is not positive definite.
+    """
+    L, failed = lapack.dpotrf(S.T, lower=1, clean=0, overwrite_a=0)
+    if failed:
+        raise BrokenFilterError("the covariance of an innovation is not positive definite")
+    return np.asarray(L)
+
+
+def solved(L: Array, b: Array) -> Array:
+    """Give ``S^-1 b`` by the factor of S, Shape (m,)."""
+    return np.asarray(lapack.dpotrs(L, b, lower=1)[0])
+
+
+def score_square(L: Array, moves: Array, innovation: Array) -> float:
+    """Give the square by which an innovation gets likelier if the state may move freely.
+
+    ``g = M^T S^-1 r``, ``A = M^T S^-1 M``, ``g^T A^+ g``: chi-square of p degrees of freedom where
+    the innovation is as its covariance S says.
+
+    Args:
+        L: Factor of S, Shape (m, m).
+        moves: What unit moves do to the measurement, M, Shape (m, p).
+        innovation: Shape (m,).
+    """
+    white = blas.dtrsm(1.0, L, np.column_stack([moves, innovation]), lower=1)
+    g = white[:, :-1].T @ white[:, -1]
+    return float(g @ np.linalg.lstsq(white[:, :-1].T @ white[:, :-1], g, rcond=1e-12)[0])
+
+
+def update_in_place(P: Array, HP: Array, L: Array, innovation: Array) -> tuple[Array, float]:
     """Take in a measurement whose ``H P`` is at hand, by the square root of its innovation's S.
 
     ``S = L L^T``, ``W = L^-1 H P``: ``P+ = P - W^T W`` and ``dx = W^T L^-1 innovation``. One
@@ -202,21 +237,18 @@ def update_in_place(P: Array, HP: Array, S: Array, innovation: Array) -> tuple[A
     Args:
         P: Covariance, Shape (n, n), C-contiguous; changed.
         HP: ``H P``, Shape (m, n), C-contiguous; spoiled.
-        S: Covariance of the innovation, Shape (m, m), C-contiguous; spoiled.
+        L: Factor of the innovation's covariance S as `square_root` gives it, Shape (m, m).
         innovation: Measured minus predicted, Shape (m,).
 
     Returns:
         The correction of the state, Shape (n,), and ``innovation^T S^-1 innovation``.
 
     Raises:
-        BrokenFilterError: S or the new P is not positive definite.
+        BrokenFilterError: The new P is not positive definite.
 
     Reference:
         Bar-Shalom, Li, Kirubarajan (2001), eq. 5.2.3-17 [recalled].
     """
-    L, failed = lapack.dpotrf(S.T, lower=1, clean=0, overwrite_a=1)
-    if failed:
-        raise BrokenFilterError("the covariance of an innovation is not positive definite")
     W_T = blas.dtrsm(1.0, L, HP.T, side=1, lower=1, trans_a=1, overwrite_b=1)
     white = blas.dtrsv(L, innovation, lower=1)
     blas.dsyrk(-1.0, W_T, beta=1.0, c=P.T, lower=0, overwrite_c=1)

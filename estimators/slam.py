@@ -13,16 +13,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators import slam_gate
+from estimators import slam_gate, slam_slips
 from estimators.frame_to_frame import declared_sightings
 from estimators.gaussian import chi_square_threshold
 from estimators.odometry_steps import image_odometry
 from estimators.retention import build_policy, choose_anchors, expired_anchors
 from estimators.slam_iterate import relinearised
-from estimators.slam_map import LASTING, LandmarkMap
+from estimators.slam_map import LASTING, POSE, LandmarkMap
 from estimators.slam_spec import AnchorSpec, BoundedQueue, SlamSpec
 from estimators.slam_state import SlamState
-from estimators.slam_values import Innovations, Step
+from estimators.slam_values import Innovations, Joint, Step
 from estimators.thinning import spread_over_image
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
@@ -121,9 +121,10 @@ class SlamRun:
         self.state = SlamState(start, calibration, spec, rate_sigma_radps)
         self._policy = build_policy(spec.retention)
         self._threshold = chi_square_threshold(3, spec.gate_probability)
+        self._slip_threshold = chi_square_threshold(POSE, 1.0 - spec.slip_probability)
         self._standing = spec.anchors is not None
         self._rested = self._moved = 0
-        self._unfixed, self._moved_on = np.zeros(6), np.zeros(6)
+        self._unfixed = np.zeros(6)
         self._log: dict[str, list[float]] = {name: [] for name in LOGGED}
 
     def advance(self, step: Step) -> None:
@@ -131,10 +132,9 @@ class SlamRun:
         scale = self._spec.noise_scale
         step = replace(step, noise=scale * step.noise, drift_px=scale * step.drift_px)
         self.state.advance(step)
-        twist = step.twist
-        self._unfixed, self._moved_on = self._unfixed + np.abs(twist), self._moved_on + twist
+        self._unfixed = self._unfixed + np.abs(step.twist)
         if self._standing and self._spec.anchors is not None:
-            self._watch_standstill(twist, self._spec.anchors)
+            self._watch_standstill(step.twist, self._spec.anchors)
 
     def _watch_standstill(self, twist: Array, anchors: AnchorSpec) -> None:
         """Choose the anchors when the rover sets off after it has stood for long enough."""
@@ -157,14 +157,14 @@ class SlamRun:
         slots = self.landmarks.slots(landmark_id)
         variance = (self._spec.noise_scale * sigma_px[rows]) ** 2
         seen = self.state.innovations(slots[known], stereo_px[known], variance[known])
-        slipped, seen, fits = self._gated(seen)
-        accepted, nis = self._taken_in(seen, fits)
+        slipped, seen, fits, joint = self._gated(seen)
+        accepted, nis = self._taken_in(seen, fits, joint)
         count = int(accepted.sum())
         # Where most do not fit it is the pose that is wrong, not the landmarks.
         blamed = seen.slots[~accepted] if 2 * count > len(seen) else seen.slots[:0]
         self.landmarks.count_image(seen.slots[accepted], blamed)
         if count >= self._spec.sightings_min:
-            self._unfixed, self._moved_on = np.zeros(6), np.zeros(6)
+            self._unfixed = np.zeros(6)
         new, dropped = self._renew(landmark_id[~known], stereo_px[~known], variance[~known])
         self._note(
             sightings=len(slots),
@@ -190,57 +190,44 @@ class SlamRun:
         """Give what was logged of each image."""
         return {name: np.array(values) for name, values in self._log.items()}
 
-    def _gated(self, seen: Innovations) -> tuple[bool, Innovations, Bools]:
+    def _gated(self, seen: Innovations) -> tuple[bool, Innovations, Bools, Joint]:
         """Tell whether odometry slipped, and which sightings fit by themselves."""
-        fits = self.state.squared_distances(seen) <= self._threshold
-        if len(seen) < self._spec.sightings_min or not self._slipped(seen, fits):
-            return False, seen, fits
-        self.state.disturb(self._slip_noise())
-        fits = self.state.squared_distances(seen) <= self._threshold
-        if fits.sum() >= self._spec.sightings_min:
-            seen = relinearised(self.state, seen, seen.take(fits), self._spec.slip_rounds)
-            fits = self.state.squared_distances(seen) <= self._threshold
-        return True, seen, fits
+        fits, joint = self._fits(seen), self.state.joint(seen)
+        if self._spec.slip_probability == 0.0 or len(seen) < self._spec.sightings_min:
+            return False, seen, fits, joint
+        moves, sizes, agree = slam_slips.moves(self.state, seen), self._slip_sizes(), fits
+        if not fits.all():
+            agree = slam_slips.agreeing(seen, moves, joint.S, sizes, self._threshold)
+        square = slam_slips.contradiction(seen, moves, joint, agree)
+        if square <= self._slip_threshold or agree.sum() < self._spec.sightings_min:
+            return False, seen, fits, joint
+        self.state.disturb(np.diag(sizes))
+        seen = relinearised(self.state, seen, seen.take(agree), self._spec.slip_rounds)
+        return True, seen, self._fits(seen), self.state.joint(seen)
 
-    def _slipped(self, seen: Innovations, fits: Bools) -> bool:
-        """Tell whether too few sightings fit, of those that would tell if the rover had stood.
+    def _fits(self, seen: Innovations) -> Bools:
+        return np.asarray(self.state.squared_distances(seen) <= self._threshold)
 
-        A far landmark fits whatever the wheels say: where its sighting would stay within its noise
-        had the rover not moved since the last image that fitted, it is not asked.
-        """
-        if fits.all():
-            return False
-        moved_px = seen.moved_by(self.state.directions(self._moved_on[None])[0])
-        tells = np.einsum("mi,mi->m", moved_px, moved_px) > self._threshold * seen.variance
-        asked = fits[tells] if tells.sum() >= self._spec.sightings_min else fits
-        return bool(asked.mean() < self._spec.slip_share)
-
-    def _taken_in(self, seen: Innovations, fits: Bools) -> tuple[Bools, float]:
+    def _taken_in(self, seen: Innovations, fits: Bools, joint: Joint) -> tuple[Bools, float]:
         """Correct the state by the sightings that fit together; gives which, and their NIS."""
-        if not fits.any():
-            return fits, 0.0
-        candidates = seen.take(fits)
-        r, (HP, S) = candidates.r, self.state.joint(candidates)
         accepted = fits
-        if self._spec.association_check != "none":
-            together = np.empty(len(candidates))
-            slam_gate.consensus(S, r, self._threshold, together)
-            agree = together > 0
-            if not agree.all():
-                rows = np.repeat(agree, 3)
-                r, HP, S = r[agree], HP[rows], S[np.ix_(rows, rows)]
-                accepted = np.zeros_like(fits)
-                accepted[np.flatnonzero(fits)[agree]] = True
-        nis = self.state.correct(r, HP, S)
+        if self._spec.association_check != "none" and fits.any():
+            together = np.empty(int(fits.sum()))
+            slam_gate.consensus(joint.take(fits).S, seen.r[fits], self._threshold, together)
+            accepted = fits.copy()
+            accepted[fits] = together > 0
+        if not accepted.any():
+            return accepted, 0.0
+        nis = self.state.correct(seen.r[accepted], joint.take(accepted))
         if self._spec.coupling != "coupled":
             self.state.decouple(self._spec.coupling == "decoupled_pose_kept")
         return accepted, nis
 
-    def _slip_noise(self) -> Array:
-        """Give the noise of the steps since the last fix, believed to within their length only."""
+    def _slip_sizes(self) -> Array:
+        """Give the error of the steps since the last fix, believed to within their length only."""
         spec, sizes = self._spec, np.linalg.norm(self._unfixed.reshape(2, 3), axis=1)
         least = spec.slip_sigma_m, spec.slip_sigma_rad
-        return np.diag(np.repeat(np.maximum(sizes, least), 3))
+        return np.asarray(np.repeat(np.maximum(sizes, least), 3))
 
     def _renew(self, landmark_id: Ints, stereo_px: Array, variance: Array) -> tuple[int, int]:
         """Let landmarks leave and enter; gives how many entered and left."""

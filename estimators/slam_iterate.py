@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from estimators import gaussian
+from estimators import gaussian_blocks
 from estimators.slam_state import SlamState
 from estimators.slam_values import Innovations
 from lpet_sim.recording.arrays import Array
@@ -32,8 +32,8 @@ def relinearised(
     """
     start, dx = _mean(state), None
     for _ in range(rounds):
-        HP, S = state.joint(believed)
-        dx = HP.T @ gaussian.cholesky_solve(S, believed.r.reshape(-1, 1))[:, 0]
+        joint = state.joint(believed)
+        dx = joint.HP.T @ gaussian_blocks.solved(joint.L, believed.r.ravel())
         state.retract(dx)
         believed = state.innovations(believed.slots, believed.z, believed.variance)
         believed = replace(believed, r=believed.r + believed.moved_by(dx))

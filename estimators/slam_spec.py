@@ -118,9 +118,9 @@ class SlamSpec(Spec):
         far_disparity_sigmas: A landmark whose disparity is below this many of its standard
             deviations when it enters is far: it is held as image coordinates, not as a place.
         misfits_max: A landmark leaves after this many sightings in a row that do not fit.
-        slip_share: If fewer than this share of the known landmarks pass their gates, of those whose
-            sightings would show it had the rover stood, the wheels may have slipped: the steps
-            since the last image that fitted are then believed to within their own length only.
+        slip_probability: Where the sightings that agree with one another contradict odometry by
+            what it would do less often than this, the wheels have slipped: the steps since the last
+            image that fitted are then believed to within their own length only. 0 believes them.
         slip_rounds: Times that the sightings are then linearised anew.
         slip_sigma_m: Least error of such a step [m].
         slip_sigma_rad: Likewise of its rotation [rad].
@@ -144,7 +144,7 @@ class SlamSpec(Spec):
     sightings_max: Annotated[int, Field(ge=1)] = 120
     far_disparity_sigmas: Annotated[float, Field(ge=0.0)] = 5.0
     misfits_max: Annotated[int, Field(ge=1)] = 3
-    slip_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.7
+    slip_probability: Annotated[float, Field(ge=0.0, lt=1.0)] = 1e-6
     slip_rounds: Annotated[int, Field(ge=0)] = 4
     slip_sigma_m: Annotated[float, Field(gt=0.0)] = 0.01
     slip_sigma_rad: Annotated[float, Field(gt=0.0)] = 0.005

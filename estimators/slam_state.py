@@ -12,7 +12,7 @@ from estimators.observation import camera_vector, transfer
 from estimators.slam_kernels import FIRST_ESTIMATES, RELATIVE, RIGHT_INVARIANT, STANDARD
 from estimators.slam_map import FREE, LASTING, POSE, LandmarkMap
 from estimators.slam_spec import SlamSpec
-from estimators.slam_values import Innovations, Step
+from estimators.slam_values import Innovations, Joint, Step
 from lpet_sim.geometry import SE3
 from lpet_sim.geometry.so3 import left_jacobian
 from lpet_sim.recording.arrays import Array, Ints
@@ -151,23 +151,22 @@ class SlamState:
         slam_gate.gate(self.P, seen.rows, seen.r, seen.H, seen.G, seen.variance, out)
         return out
 
-    def joint(self, seen: Innovations) -> tuple[Array, Array]:
-        """Give ``H P``, Shape (3 m, n), and the innovations' covariance, Shape (3 m, 3 m)."""
+    def joint(self, seen: Innovations) -> Joint:
+        """Give the covariances of stacked innovations, with the state and among themselves."""
         HP = np.empty((3 * len(seen), len(self.P)))
         S = np.empty((3 * len(seen), 3 * len(seen)))
         slam_gate.project_covariance(self.P, seen.rows, seen.H, seen.G, HP)
         slam_gate.innovation_covariance(HP, seen.rows, seen.H, seen.G, seen.variance, S)
-        return HP, S
+        return Joint(HP, S)
 
-    def correct(self, r: Array, HP: Array, S: Array) -> float:
+    def correct(self, r: Array, joint: Joint) -> float:
         """Take sightings in and give their normalised innovation squared.
 
         Args:
             r: Seen minus predicted [px], Shape (m, 3).
-            HP: As `joint` gives it; spoiled.
-            S: Likewise.
+            joint: As `joint` gives it of them; spoiled.
         """
-        dx, nis = gaussian_blocks.update_in_place(self.P, HP, S, r.ravel())
+        dx, nis = gaussian_blocks.update_in_place(self.P, joint.HP, joint.L, r.ravel())
         self.retract(dx)
         return nis
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators import gaussian_blocks
 from lpet_sim.recording.arrays import Array, Ints
 
 
@@ -44,13 +46,38 @@ class Innovations:
         return Innovations(self.slots[which], rows, *values)
 
     def moved_by(self, dx: Array) -> Array:
-        """Give how a correction of the state changes the predictions, to first order, (m, 3)."""
+        """Give how corrections of the state, Shape (..., n), move the predictions, (..., m, 3)."""
         block = np.arange(6)
-        landmarks = dx[self.rows[0][:, None] + block[:3]]
+        landmarks = dx[..., self.rows[0][:, None] + block[:3], None]
         hosted = (self.rows[1] >= 0)[:, None]
-        pose = dx[:6] - np.where(hosted, dx[self.rows[1][:, None] + block], 0.0)
-        moves = np.einsum("mij,mj->mi", self.H, pose) + np.einsum("mij,mj->mi", self.G, landmarks)
-        return np.asarray(moves)
+        hosts = np.where(hosted, dx[..., self.rows[1][:, None] + block], 0.0)
+        pose = (dx[..., None, :6] - hosts)[..., None]
+        return np.asarray((self.H @ pose + self.G @ landmarks)[..., 0])
+
+
+@dataclass
+class Joint:
+    """The covariances of stacked innovations.
+
+    Attributes:
+        HP: With the state, Shape (3 m, n).
+        S: Among themselves, Shape (3 m, 3 m).
+    """
+
+    HP: Array
+    S: Array
+
+    @cached_property
+    def L(self) -> Array:
+        """The lower Cholesky factor of S."""
+        return gaussian_blocks.square_root(self.S)
+
+    def take(self, which: NDArray[np.bool_]) -> Joint:
+        """Keep some sightings, given by a mask of Shape (m,)."""
+        if which.all():
+            return self
+        rows = np.flatnonzero(np.repeat(which, 3))
+        return Joint(self.HP[rows], self.S[rows[:, None], rows])
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,13 @@ WORLD_FORMS = FORMS[:3]
 CAMERA = stereo()
 SIGHTINGS = np.array([[600.0, 560.0, 700.0], [300.0, 295.0, 520.0], [450.0, 430.0, 610.0]])
 STEP = np.array([0.2, 0.01, -0.02, 0.01, 0.02, -0.03])
+NO_CHECKS: dict[str, object] = {
+    "association_check": "none",
+    "gate_probability": 1.0 - 1e-12,
+    "slip_probability": 0.0,
+    "misfits_max": 9999,
+}
+"""Nothing is refused, so that only the filter itself is looked at."""
 
 
 def spec(form: str, far: bool = False, **more: object) -> SlamSpec:

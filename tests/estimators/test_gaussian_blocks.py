@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import chi2, kstest
 
 from estimators import gaussian, gaussian_blocks
 from lpet_sim.errors import BrokenFilterError
@@ -136,7 +137,9 @@ def test_an_update_by_the_square_root_equals_josephs(seed: int) -> None:
     dx, joseph = gaussian.update(P, H, r, noise)
     S = H @ P @ H.T + noise
     found = P.copy()
-    moved, nis = gaussian_blocks.update_in_place(found, np.ascontiguousarray(H @ P), S.copy(), r)
+    L, HP = gaussian_blocks.square_root(S), np.ascontiguousarray(H @ P)
+    moved, nis = gaussian_blocks.update_in_place(found, HP, L, r)
+    np.testing.assert_allclose(gaussian_blocks.solved(L, r), np.linalg.solve(S, r), rtol=1e-10)
     np.testing.assert_allclose(found, joseph, rtol=0, atol=1e-10 * np.abs(joseph).max())
     np.testing.assert_allclose(moved, dx, rtol=0, atol=1e-10 * np.abs(dx).max())
     assert nis == pytest.approx(gaussian.normalised_square(r, S), rel=1e-10)
@@ -148,9 +151,26 @@ def test_a_covariance_that_is_none_ends_the_filter() -> None:
     """An indefinite S, and a P that an update would drive below zero."""
     P, H = np.eye(3), np.eye(3)[:1]
     with pytest.raises(BrokenFilterError, match="innovation is not positive definite"):
-        gaussian_blocks.update_in_place(P.copy(), H @ P, np.array([[-1.0]]), np.ones(1))
+        gaussian_blocks.square_root(np.array([[-1.0]]))
     with pytest.raises(BrokenFilterError, match="state is not positive definite"):
-        gaussian_blocks.update_in_place(P.copy(), H @ P, np.array([[0.5]]), np.ones(1))
+        gaussian_blocks.update_in_place(P.copy(), H @ P, np.sqrt([[0.5]]), np.ones(1))
     indefinite = np.diag([1.0, -1e-3, 1.0])
     with pytest.raises(BrokenFilterError, match="state is not positive definite"):
-        gaussian_blocks.update_in_place(indefinite, H @ P, np.array([[2.0]]), np.ones(1))
+        gaussian_blocks.update_in_place(indefinite, H @ P, np.sqrt([[2.0]]), np.ones(1))
+
+
+def test_a_score_square_is_what_a_free_move_takes_off_the_misfit() -> None:
+    """Least squares tells the same, and where S holds it is chi-square of as many freedoms."""
+    M, root = matrix(12, 3, 0), matrix(12, 12, 1)
+    S = root @ root.T + np.eye(12)
+    L, draws = gaussian_blocks.square_root(S), stream(1, "score")
+    r = draws.standard_normal(12)
+    white_M, white_r = np.linalg.solve(np.tril(L), M), np.linalg.solve(np.tril(L), r)
+    _, rest, *_ = np.linalg.lstsq(white_M, white_r)
+    taken_off = white_r @ white_r - rest[0]
+    assert gaussian_blocks.score_square(L, M, r) == pytest.approx(taken_off, rel=1e-9)
+    noise = draws.standard_normal((4000, 12)) @ np.tril(L).T
+    squares = [gaussian_blocks.score_square(L, M, row) for row in noise]
+    assert kstest(squares, chi2(3).cdf).pvalue > 1e-3
+    blind = np.column_stack([M, np.zeros(12)])
+    assert gaussian_blocks.score_square(L, blind, r) == pytest.approx(taken_off, rel=1e-9)

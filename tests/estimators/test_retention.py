@@ -26,7 +26,7 @@ POINTS = stream(0, "points").uniform([-3.0, -1.0, 4.0], [3.0, 1.0, 12.0], (40, 3
 """In the camera of a rover that stands [m]."""
 STANDS = Step(np.zeros(6), np.zeros((0, 6)), np.zeros((4, 6)))
 MOVES = Step(np.array([0.05, 0, 0, 0, 0, 0]), np.zeros((0, 6)), np.zeros((4, 6)))
-EXACT: dict[str, Any] = {"association_check": "none", "slip_share": 0.0}
+EXACT: dict[str, Any] = {"association_check": "none", "slip_probability": 0.0}
 
 
 def standing(**values: object) -> SlamRun:

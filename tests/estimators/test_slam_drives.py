@@ -16,14 +16,14 @@ from estimators.slam import Slam, SlamRun, odometry_step
 from estimators.slam_map import LASTING, POSE
 from estimators.slam_spec import BoundedQueue, SlamSpec, TimeToLive
 from estimators.slam_state import SlamState
-from estimators.slam_values import Innovations
+from estimators.slam_values import Innovations, Joint
 from lpet_sim.evaluation.consistency import anees
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.streams import Measurements, SightingStream
 from lpet_sim.rng import stream
-from tests.estimators.slam_worlds import FORMS, dense, live, spec
+from tests.estimators.slam_worlds import FORMS, NO_CHECKS, dense, live, spec
 
 SLIP = 20
 """The image whose odometry is wrong."""
@@ -67,8 +67,36 @@ def test_without_a_slip_none_is_flagged() -> None:
     drive = Drive(40)
     given = drive.measurements(0)
     assert not Slam().estimate(given).diagnostics["slipped"].any()
-    blind = Slam(SlamSpec(slip_share=0.0)).estimate(slipped(given, 1.0))
+    blind = Slam(SlamSpec(slip_probability=0.0)).estimate(slipped(given, 1.0))
     assert nees(blind, drive.poses(), SLIP) > 1e3
+
+
+def misnamed(given: Measurements, share: float, seed: int) -> Measurements:
+    """Let a share of the sightings be of something else, some hundred pixels off."""
+    assert given.sightings is not None
+    rng, px = stream(seed, "misnamed"), given.sightings.stereo_px.copy()
+    rows = rng.random(len(px)) < share
+    px[rows] += 100.0 * rng.standard_normal((int(rows.sum()), 3))
+    return replace(given, sightings=replace(given.sightings, stereo_px=px))
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("share", [0.0, 0.05])
+def test_a_slip_through_which_most_sightings_fit_is_flagged(form: str, share: float) -> None:
+    """Four centimetres in one step: each fits by itself, together they contradict odometry.
+
+    Wrong names neither hide it nor look like one.
+    """
+    drive = Drive(40)
+    for seed in range(3):
+        given = misnamed(drive.measurements(seed), share, seed)
+        assert not Slam(spec(form)).estimate(given).diagnostics["slipped"].any()
+        found = Slam(spec(form)).estimate(slipped(given, 0.04))
+        assert np.flatnonzero(found.diagnostics["slipped"]).tolist() == [SLIP]
+        blind = Slam(spec(form, slip_probability=0.0)).estimate(slipped(given, 0.04))
+        log = blind.diagnostics
+        assert log["accepted"][SLIP] > 0.6 * log["matched"][SLIP]
+        assert nees(found, drive.poses(), SLIP) < THREE_SIGMA < nees(blind, drive.poses(), SLIP)
 
 
 def under_a_skyline(given: Measurements, poses: SE3, seed: int) -> Measurements:
@@ -233,12 +261,12 @@ class Joseph:
         """Begin without sightings."""
         self._seen: tuple[SlamState, Innovations] | None = None
 
-    def joint(self, state: SlamState, seen: Innovations) -> tuple[Array, Array]:
+    def joint(self, state: SlamState, seen: Innovations) -> Joint:
         """Remember what is about to be taken in."""
         self._seen = state, seen
-        return np.zeros((3 * len(seen), len(state.P))), np.zeros((3 * len(seen),) * 2)
+        return Joint(np.zeros((3 * len(seen), len(state.P))), np.eye(3 * len(seen)))
 
-    def update(self, P: Array, _HP: Array, _S: Array, r: Array) -> tuple[Array, float]:
+    def update(self, P: Array, _HP: Array, _L: Array, r: Array) -> tuple[Array, float]:
         """Take it in."""
         assert self._seen is not None
         state, seen = self._seen
@@ -258,7 +286,7 @@ def test_two_thousand_updates_keep_the_covariance_positive_and_equal_to_josephs(
 ) -> None:
     """Through some thousand entries, drops and keyframes; the two runs end at one estimate."""
     given = Drive(2000, visible=8, sightings=8).measurements(0)
-    chosen = SlamSpec(association_check="none", slip_share=0.0, retention=TimeToLive(images=5))
+    chosen = SlamSpec.from_mapping(NO_CHECKS | {"retention": TimeToLive(images=5).to_mapping()})
     run, least = driven(chosen, given), []
     for k in run:
         if k % 50 == 49:

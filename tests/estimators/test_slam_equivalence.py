@@ -16,17 +16,11 @@ from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.streams import Measurements, OdometryStream, SightingStream
 from lpet_sim.rng import stream
 from tests.estimators.peer_runs import error, kept, recorded
+from tests.estimators.slam_worlds import NO_CHECKS
 from tests.estimators.stereo_traverse import SIGMA_PX, scene
 from tests.estimators.two_image_filter import filter_two_images
 
 IMAGES = 12
-NO_CHECKS = {
-    "association_check": "none",
-    "gate_probability": 1.0 - 1e-12,
-    "slip_share": 0.0,
-    "misfits_max": 9999,
-}
-"""Nothing is refused, so that only the filter itself is looked at."""
 ONE_IMAGE = TimeToLive(images=1).to_mapping()
 START_VARIANCE = 1e-12
 LOOKS = 12
