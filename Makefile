@@ -43,6 +43,7 @@ experiments: opengl
 	$(BIN)/python -m scenarios.kitti_prediction
 	$(BIN)/python -m scenarios.reach_checks
 	$(BIN)/python -m scenarios.tradeoff_check
+	$(BIN)/python -m scenarios.tradeoff_stability
 
 paper: $(STAMP) ## the paper's experiment: hours; goes on where it was
 	$(BIN)/python -m scenarios.paper_experiment

@@ -1,4 +1,4 @@
-"""The scenario that compares prediction and simulation runs as it stands."""
+"""The scenarios that compare prediction and simulation, and seeds, run as they stand."""
 
 from __future__ import annotations
 
@@ -15,3 +15,13 @@ def test_prediction_and_simulation_are_compared_on_a_short_drive(tmp_path: Path)
     table, picture = written_by(printed)
     assert len(table.read_text().splitlines()) == 5
     assert picture.stat().st_size > 10_000
+
+
+def test_a_trade_off_is_repeated_with_other_seeds_on_a_short_drive(tmp_path: Path) -> None:
+    """Two sensors, two seeds: a sentence and a row for each."""
+    printed = run_quick("tradeoff_stability.py", tmp_path, "--out", str(tmp_path / "stability"))
+    assert "of 2 seeds recommend the same sensor" in printed
+    (table,) = written_by(printed)
+    rows = table.read_text().splitlines()
+    assert rows[0].startswith("seed,field_of_view_rad")
+    assert [row.split(",")[0] for row in rows[1:]] == ["0", "1"]
