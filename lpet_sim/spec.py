@@ -23,15 +23,28 @@ class Spec(BaseModel):
 
     @classmethod
     def from_yaml(cls, path: Path | str) -> Self:
-        """Read the spec from a YAML file.
+        """Read the spec from a YAML file; the files that it names are looked for beside it.
 
         Args:
             path: The file.
 
         Raises:
-            SpecError: The file is missing, is not YAML, or holds an unknown key or a bad value.
+            SpecError: A file is missing, is not YAML, or holds an unknown key or a bad value.
         """
-        return cls.from_mapping(read_yaml(Path(path)), source=str(path))
+        mapping, folder = read_yaml(Path(path)), Path(path).resolve().parent
+        if isinstance(mapping, dict):
+            mapping = cls.files_beside(mapping, folder)
+        return cls.from_mapping(mapping, source=str(path))
+
+    @classmethod
+    def files_beside(cls, mapping: dict[str, Any], folder: Path) -> dict[str, Any]:  # noqa: ARG003
+        """Find the files that a mapping names; a spec that may name some has its own.
+
+        Args:
+            mapping: The spec as read from YAML, not yet validated.
+            folder: Where its YAML file lies.
+        """
+        return mapping
 
     @classmethod
     def from_mapping(cls, mapping: object, source: str = "spec") -> Self:

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from lpet_sim.errors import SpecError
 from lpet_sim.planning.mobility import MobilitySpec
 from lpet_sim.rng import stream
-from lpet_sim.spec import Spec, read_yaml
+from lpet_sim.spec import Spec
 from lpet_sim.terrain.box import Box
 from lpet_sim.terrain.load import named_terrain, terrain_beside
 from lpet_sim.terrain.rock_spec import RockAbundanceSpec
@@ -79,16 +79,11 @@ class ReachSpec(Spec):
     search: SearchSpec = SearchSpec()
 
     @classmethod
-    def from_yaml(cls, path: Path | str) -> Self:
-        """Read the study from a YAML file; files of terrain and soils may lie beside it.
-
-        Raises:
-            SpecError: The file is missing, is not YAML, or holds an unknown key or a bad value.
-        """
-        mapping, folder = read_yaml(Path(path)), Path(path).parent
-        if isinstance(mapping, dict) and "terrain" in mapping:
-            mapping |= {"terrain": terrain_beside(mapping["terrain"], folder)}
-        return cls.from_mapping(mapping, source=str(path))
+    def files_beside(cls, mapping: dict[str, Any], folder: Path) -> dict[str, Any]:
+        """Find the files of terrain and soils."""
+        if "terrain" not in mapping:
+            return mapping
+        return mapping | {"terrain": terrain_beside(mapping["terrain"], folder)}
 
     @property
     def box(self) -> Box:

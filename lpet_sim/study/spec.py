@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from lpet_sim.evaluation import Requirement
 from lpet_sim.planning.reach_spec import ReachSpec
-from lpet_sim.spec import Spec, read_yaml
+from lpet_sim.spec import Spec
 from lpet_sim.sweep.sweep_spec import VariantSpec
-from lpet_sim.sweep.traverse import files_beside
 from lpet_sim.tradeoff.proxies import ProxySpec
 from lpet_sim.tradeoff.space import SamplingSpec, SensorSpaceSpec
 from lpet_sim.tradeoff.spec import ConstraintSpec, RuleSpec, SiteSpec, StaticSpec
@@ -113,16 +112,11 @@ class StudySpec(Spec):
     draws: Annotated[int, Field(ge=1)] = 10
 
     @classmethod
-    def from_yaml(cls, path: Path | str) -> Self:
-        """Read a study from a YAML file; files of terrain and soils may lie beside it.
-
-        Raises:
-            SpecError: The file is missing, is not YAML, or holds an unknown key or a bad value.
-        """
-        mapping, folder = read_yaml(Path(path)), Path(path).resolve().parent
-        if isinstance(mapping, dict) and isinstance(mapping.get("reach"), dict):
-            mapping |= {"reach": files_beside(dict(mapping["reach"]), folder)}
-        return cls.from_mapping(mapping, source=str(path))
+    def files_beside(cls, mapping: dict[str, Any], folder: Path) -> dict[str, Any]:
+        """Find the files of terrain and soils."""
+        if not isinstance(reach := mapping.get("reach"), dict):
+            return mapping
+        return mapping | {"reach": ReachSpec.files_beside(reach, folder)}
 
     def site(self, distance_m: float) -> SiteSpec:
         """Say where the sensor is used, for a distance [m]."""

@@ -11,8 +11,8 @@ from lpet_sim.evaluation import EvaluationSpec, Requirement
 from lpet_sim.sensors.camera_spec import DeclaredErrorSpec
 from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec
 from lpet_sim.sensors.suite import SensorSuiteSpec
-from lpet_sim.spec import Spec, read_yaml
-from lpet_sim.sweep.traverse import TraverseSpec, files_beside
+from lpet_sim.spec import Spec
+from lpet_sim.sweep.traverse import TraverseSpec
 
 _ARM_KEYS = {"sensor", "declared", "sensors", "draw"}
 
@@ -122,26 +122,14 @@ class SweepSpec(Spec):
     time_limit_s: Annotated[float, Field(gt=0.0)] | None = None
 
     @classmethod
-    def from_yaml(cls, path: Path | str) -> Self:
-        """Read a sweep from a YAML file; the files that it names are looked for beside it.
-
-        Raises:
-            SpecError: A file is missing, is not YAML, or holds an unknown key or a bad value.
-        """
-        mapping, folder = read_yaml(Path(path)), Path(path).resolve().parent
-        if isinstance(mapping, dict):
-            mapping = mapping | _files_in(mapping, folder)
-        return cls.from_mapping(mapping, source=str(path))
-
-
-def _files_in(mapping: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Give the parts of a sweep that may name files, with the files found or read."""
-    found: dict[str, Any] = {}
-    if isinstance(sets := mapping.get("data_sets"), dict):
-        found["data_sets"] = _data_sets_beside(sets, folder)
-    if isinstance(arms := mapping.get("arms"), dict):
-        found["arms"] = {name: _sensor_beside(arm, folder) for name, arm in arms.items()}
-    return found
+    def files_beside(cls, mapping: dict[str, Any], folder: Path) -> dict[str, Any]:
+        """Find the recordings, and read the traverse and the sensors."""
+        found = dict(mapping)
+        if isinstance(sets := mapping.get("data_sets"), dict):
+            found["data_sets"] = _data_sets_beside(sets, folder)
+        if isinstance(arms := mapping.get("arms"), dict):
+            found["arms"] = {name: _sensor_beside(arm, folder) for name, arm in arms.items()}
+        return found
 
 
 def _data_sets_beside(sets: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -150,8 +138,8 @@ def _data_sets_beside(sets: dict[str, Any], folder: Path) -> dict[str, Any]:
         found["recordings"] = [str(folder / g) if isinstance(g, str) else g for g in globs]
     if isinstance(traverse := sets.get("traverse"), str):
         found["traverse"] = TraverseSpec.from_yaml(folder / traverse)
-    elif traverse is not None:
-        found["traverse"] = files_beside(traverse, folder)
+    elif isinstance(traverse, dict):
+        found["traverse"] = TraverseSpec.files_beside(traverse, folder)
     return found
 
 

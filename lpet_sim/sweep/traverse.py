@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
@@ -16,7 +16,7 @@ from lpet_sim.recording.recording import Manifest
 from lpet_sim.rover.spec import DriveSpec, RoverSpec
 from lpet_sim.sensors.suite import SensorSuiteSpec
 from lpet_sim.soil.load import soil_beside
-from lpet_sim.spec import Spec, read_yaml
+from lpet_sim.spec import Spec
 from lpet_sim.terrain.load import named_terrain, terrain_beside
 from lpet_sim.terrain.spec import TerrainSpec
 from lpet_sim.terrain.terrain import Terrain
@@ -74,38 +74,22 @@ class TraverseSpec(Spec):
     images: ImagesSpec | None = ImagesSpec()
 
     @classmethod
-    def from_yaml(cls, path: Path | str) -> Self:
-        """Read the traverse from a YAML file; files of terrain and soils may lie beside it.
-
-        That holds for the soil that stands for rocks (``rover.wheel_soil.rock``) too.
-
-        Raises:
-            SpecError: The file is missing, is not YAML, or holds an unknown key or a bad value.
-        """
-        mapping = files_beside(read_yaml(Path(path)), Path(path).parent)
-        return cls.from_mapping(mapping, source=str(path))
+    def files_beside(cls, mapping: dict[str, Any], folder: Path) -> dict[str, Any]:
+        """Find the files of terrain and soils, that of the soil that stands for rocks too."""
+        found = dict(mapping)
+        if "terrain" in mapping:
+            found["terrain"] = terrain_beside(mapping["terrain"], folder)
+        if "rover" in mapping:
+            found["rover"] = _rock_beside(mapping["rover"], folder)
+        return found
 
 
-def files_beside(mapping: object, folder: Path) -> object:
-    """Find the files that a traverse as read from YAML names, where they lie in its folder.
-
-    Args:
-        mapping: The traverse, not yet validated.
-        folder: Where its YAML file lies.
-    """
-    if isinstance(mapping, dict) and "terrain" in mapping:
-        mapping |= {"terrain": terrain_beside(mapping["terrain"], folder)}
-    _find_rock(mapping, folder)
-    return mapping
-
-
-def _find_rock(mapping: object, folder: Path) -> None:
-    """Put the path of the soil that stands for rocks, if it is a file in the folder, in place."""
-    inner = mapping
-    for key in ("rover", "wheel_soil"):
-        inner = inner.get(key) if isinstance(inner, dict) else None
-    if isinstance(inner, dict) and "rock" in inner:
-        inner["rock"] = soil_beside(inner["rock"], folder)
+def _rock_beside(rover: object, folder: Path) -> object:
+    """Find the file of the soil that stands for rocks (``wheel_soil.rock``)."""
+    ground = rover.get("wheel_soil") if isinstance(rover, dict) else None
+    if not isinstance(rover, dict) or not isinstance(ground, dict) or "rock" not in ground:
+        return rover
+    return rover | {"wheel_soil": ground | {"rock": soil_beside(ground["rock"], folder)}}
 
 
 def planned_drive(spec: TraverseSpec, terrain: Terrain, seed: int) -> DriveSpec:

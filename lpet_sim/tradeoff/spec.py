@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
 from lpet_sim.evaluation import Requirement
 from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec
 from lpet_sim.sensors.wheels import WheelOdometrySpec
-from lpet_sim.spec import Spec, read_yaml
+from lpet_sim.spec import Spec
 from lpet_sim.sweep.sweep_spec import VariantSpec
 from lpet_sim.terrain.load import named_terrain, terrain_beside
 from lpet_sim.terrain.spec import TerrainSpec
@@ -159,26 +159,14 @@ class TradeoffSpec(Spec):
     simulation: SimulationSpec | None = None
 
     @classmethod
-    def from_yaml(cls, path: Path | str) -> Self:
-        """Read a trade-off from a YAML file; the files that it names are looked for beside it.
-
-        Raises:
-            SpecError: A file is missing, is not YAML, or holds an unknown key or a bad value.
-        """
-        mapping, folder = read_yaml(Path(path)), Path(path).resolve().parent
-        if isinstance(mapping, dict):
-            mapping = mapping | _files_in(mapping, folder)
-        return cls.from_mapping(mapping, source=str(path))
-
-
-def _files_in(mapping: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Give the parts of a trade-off that may name files, with the files found."""
-    found: dict[str, Any] = {}
-    if isinstance(site := mapping.get("site"), dict) and "terrain" in site:
-        found["site"] = site | {"terrain": terrain_beside(site["terrain"], folder)}
-    if isinstance(runs := mapping.get("simulation"), dict):
-        globs = runs.get("recordings")
-        if isinstance(globs, list):
-            globs = [str(folder / glob) if isinstance(glob, str) else glob for glob in globs]
-            found["simulation"] = runs | {"recordings": globs}
-    return found
+    def files_beside(cls, mapping: dict[str, Any], folder: Path) -> dict[str, Any]:
+        """Find the files of terrain and soils, and the recordings."""
+        found = dict(mapping)
+        if isinstance(site := mapping.get("site"), dict) and "terrain" in site:
+            found["site"] = site | {"terrain": terrain_beside(site["terrain"], folder)}
+        if isinstance(runs := mapping.get("simulation"), dict):
+            globs = runs.get("recordings")
+            if isinstance(globs, list):
+                globs = [str(folder / glob) if isinstance(glob, str) else glob for glob in globs]
+                found["simulation"] = runs | {"recordings": globs}
+        return found
