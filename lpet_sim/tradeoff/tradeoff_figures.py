@@ -132,5 +132,5 @@ def plot_agreement(predicted: Sequence[float], simulated: Mapping[str, Sequence[
     axes.set(xlabel="predicted RMS error [% of the distance]", xscale="log", yscale="log")
     axes.set_ylabel("simulated RMS error [% of the distance]")
     axes.grid(alpha=0.3, which="both")
-    axes.legend(loc="best")
+    axes.legend(loc="upper left")
     return figure

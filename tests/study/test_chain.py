@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +17,16 @@ import yaml
 
 from lpet_sim.planning.reach_spec import terrain_seed
 from lpet_sim.recording.reader import read_estimates, read_recording
+from lpet_sim.study.chain import DRIVES, REACH, RUNS, SENSOR, WAYS
+from lpet_sim.study.stages import STAMPS, digest
+from lpet_sim.sweep.sweep_run import TABLE
+from lpet_sim.sweep.sweep_store import read_table
 from lpet_sim.terrain.box import Box
 from lpet_sim.terrain.load import load_terrain_spec
 from lpet_sim.terrain.terrain import build_terrain
 from tests.browser import look, needs_chromium
 from tests.command import Ended
+from tests.sweep.tiny_recordings import without_timing
 
 TINY: dict[str, Any] = {
     "name": "tiny",
@@ -59,11 +66,15 @@ def studied(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended]:
     return folder, _study(folder, TINY)
 
 
-def _study(folder: Path, mapping: dict[str, Any], *words: str) -> Ended:
+def _command(folder: Path, mapping: dict[str, Any], *words: str) -> list[str]:
     (folder / "study.yaml").write_text(yaml.safe_dump(mapping))
-    command = ["study", str(folder / "study.yaml"), "--out", str(folder / "out"), *words]
+    run = [sys.executable, "-c", "from lpet_sim.cli import main; main()", "study"]
+    return [*run, str(folder / "study.yaml"), "--out", str(folder / "out"), *words]
+
+
+def _study(folder: Path, mapping: dict[str, Any], *words: str) -> Ended:
     done = subprocess.run(
-        [sys.executable, "-c", "from lpet_sim.cli import main; main()", *command],
+        _command(folder, mapping, *words),
         capture_output=True,
         text=True,
         env=os.environ | {"COLUMNS": "140"},
@@ -92,6 +103,43 @@ def test_a_study_ends_in_a_verdict(studied: tuple[Path, Ended]) -> None:
     assert all(one["whole"]["claim"]["runs"] == 4 for one in told["algorithms"])
     lines = told["algorithms"][0]["by_line"]
     assert set(lines) >= {"pass_position_throughout", "pass_yaw_end"}
+
+
+def _kill_in(stage: str, folder: Path) -> None:
+    """Start the study and kill it, workers and all, as soon as a stage is under way."""
+    stamp, end_s = folder / "out" / STAMPS / f"{stage}.json", time.monotonic() + 300.0
+    run = subprocess.Popen(
+        _command(folder, TINY),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        process_group=0,
+    )
+    while not stamp.exists():
+        assert run.poll() is None and time.monotonic() < end_s, f"{stage} was not begun"
+        time.sleep(0.01)
+    os.killpg(run.pid, signal.SIGKILL)
+    assert run.wait() == -signal.SIGKILL
+    assert json.loads(stamp.read_text())["product"] is None
+
+
+def test_a_study_killed_in_every_stage_ends_as_an_undisturbed_one(
+    studied: tuple[Path, Ended], tmp_path: Path
+) -> None:
+    """The same command after each kill: the same sensor, rows and verdict."""
+    for stage in (REACH, WAYS, DRIVES, SENSOR, RUNS):
+        _kill_in(stage, tmp_path)
+    ended = _study(tmp_path, TINY)
+    assert ended.code == 0, ended.err
+    assert [name for name, state in states(ended).items() if state == "made"] == ["runs"]
+    outs = [folder / "out" for folder in (studied[0], tmp_path)]
+    assert len({digest(out / "sensor.yaml") for out in outs}) == 1
+    rows = [read_table(out / "algorithms" / TABLE)[0] for out in outs]
+    for row in [*rows[0], *rows[1]]:
+        del row["key"]  # Names the bytes of the recording, which hold when it was written.
+    assert without_timing(rows[0]) == without_timing(rows[1])
+    assert len(rows[0]) == 8
+    told = [json.loads((out / "verdict.json").read_text()) for out in outs]
+    assert told[0]["verdict"] == told[1]["verdict"]
 
 
 def test_the_worst_runs_are_kept_as_recordings(studied: tuple[Path, Ended]) -> None:
