@@ -14,6 +14,9 @@ from estimators.gaussian import symmetrise
 from lpet_sim.errors import BrokenFilterError
 from lpet_sim.recording.arrays import Array, Ints
 
+_BLIND = 1e-12
+"""Share of the largest information below which a measurement tells nothing of a move."""
+
 
 @njit(cache=True)
 def move_block(P: Array, F: Array, cov_added: Array) -> None:
@@ -223,8 +226,11 @@ def score_square(L: Array, moves: Array, innovation: Array) -> float:
         innovation: Shape (m,).
     """
     white = blas.dtrsm(1.0, L, np.column_stack([moves, innovation]), lower=1)
-    g = white[:, :-1].T @ white[:, -1]
-    return float(g @ np.linalg.lstsq(white[:, :-1].T @ white[:, :-1], g, rcond=1e-12)[0])
+    M, r = white[:, :-1], white[:, -1]
+    sizes, axes = np.linalg.eigh(M.T @ M)
+    told = sizes > _BLIND * sizes[-1]
+    along = axes[:, told].T @ (M.T @ r)
+    return float(along @ (along / sizes[told]))
 
 
 def update_in_place(P: Array, HP: Array, L: Array, innovation: Array) -> tuple[Array, float]:

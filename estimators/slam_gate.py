@@ -72,6 +72,22 @@ def _weighted_square(S: Array, r: Array) -> float:
 
 
 @njit(cache=True)
+def moved(rows: tuple[Ints, Ints], H: Array, G: Array, dx: Array, out: Array) -> None:
+    """Give in place how corrections of the state, Shape (k, n), move sightings, (k, m, 3)."""
+    for d in range(len(dx)):
+        for i in range(len(H)):
+            c, h = rows[0][i], rows[1][i]
+            for a in range(3):
+                total = 0.0
+                for k in range(3):
+                    total += G[i, a, k] * dx[d, c + k]
+                for k in range(6):
+                    shift = dx[d, k] if h < 0 else dx[d, k] - dx[d, h + k]
+                    total += H[i, a, k] * shift
+                out[d, i, a] = total
+
+
+@njit(cache=True)
 def project_covariance(P: Array, rows: tuple[Ints, Ints], H: Array, G: Array, out: Array) -> None:
     """Give ``H P`` of the stacked sightings in place, Shape (3 m, n): few rows of P count."""
     out[:] = 0.0

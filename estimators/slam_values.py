@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators import gaussian_blocks
+from estimators import gaussian_blocks, slam_gate
 from lpet_sim.recording.arrays import Array, Ints
 
 
@@ -47,12 +47,11 @@ class Innovations:
 
     def moved_by(self, dx: Array) -> Array:
         """Give how corrections of the state, Shape (..., n), move the predictions, (..., m, 3)."""
-        block = np.arange(6)
-        landmarks = dx[..., self.rows[0][:, None] + block[:3], None]
-        hosted = (self.rows[1] >= 0)[:, None]
-        hosts = np.where(hosted, dx[..., self.rows[1][:, None] + block], 0.0)
-        pose = (dx[..., None, :6] - hosts)[..., None]
-        return np.asarray((self.H @ pose + self.G @ landmarks)[..., 0])
+        out = np.empty((*dx.shape[:-1], len(self), 3))
+        slam_gate.moved(
+            self.rows, self.H, self.G, dx.reshape(-1, dx.shape[-1]), out.reshape(-1, len(self), 3)
+        )
+        return out
 
 
 @dataclass
