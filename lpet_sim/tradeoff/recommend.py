@@ -265,23 +265,34 @@ def recommend(judged: Sequence[Judged], spec: TradeoffSpec) -> Recommendation:
     return Recommendation(chosen, reason, line, uses[line])
 
 
-def survivors(predictions: Sequence[Prediction], on_front: Ints, first: int, most: int) -> Ints:
-    """Pick the candidates to simulate: the one recommended so far, and the Pareto set.
+def survivors(static: Sequence[Judged], on_front: Ints, first: Judged, spec: TradeoffSpec) -> Ints:
+    """Pick the candidates to simulate.
 
-    If the set is larger than asked for, it is thinned evenly in the order of the predicted error.
+    The one recommended so far; for half of the places those nearest to it in cost that would meet
+    the requirement if the estimator lost nothing, for they are what simulation is to decide on;
+    and the Pareto set, thinned evenly in the order of the predicted error.
 
     Args:
-        predictions: Of all candidates.
+        static: The candidates that keep to the constraints, judged by the static prediction.
         on_front: Indices of the Pareto set.
-        first: Index of the recommended one.
-        most: How many to pick at most.
+        first: The one recommended so far.
+        spec: The trade-off; its `SimulationSpec` says how many to pick at most.
 
     Returns:
         Indices in the order of all candidates.
     """
-    rest = [int(i) for i in on_front if i != first]
-    rest.sort(key=lambda i: predictions[i].error_ratio)
-    if len(rest) > most - 1:
-        at = np.linspace(0, len(rest) - 1, max(0, most - 1)).round().astype(np.int64)
-        rest = [rest[i] for i in np.unique(at)]
-    return np.array(sorted({first, *rest}), dtype=np.int64)
+    assert spec.simulation is not None
+    places = spec.simulation.survivors_max - 1
+    able = [j for j in static if j.index != first.index and _could_meet(j, spec)]
+    able.sort(key=lambda j: (abs(math.log(j.cost / first.cost)), j.index))
+    near = [j.index for j in able[: (places + 1) // 2]]
+    error = {j.index: j.prediction.error_ratio for j in static}
+    rest = sorted({int(i) for i in on_front} - {first.index, *near}, key=error.__getitem__)
+    at = np.linspace(0, len(rest) - 1, min(len(rest), places - len(near))).round()
+    return np.array(sorted({first.index, *near, *(rest[int(i)] for i in at)}), dtype=np.int64)
+
+
+def _could_meet(judged: Judged, spec: TradeoffSpec) -> bool:
+    """Tell whether a candidate would meet the requirement if the estimator lost nothing."""
+    lossless = Efficiency(1.0, 1.0, 1.0)
+    return judge(judged.index, judged.prediction, lossless, judged.cost, spec).meets

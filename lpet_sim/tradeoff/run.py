@@ -99,8 +99,7 @@ def run_tradeoff(
     picked = recommend(judged, spec)
     simulated: dict[int, SimulatedCandidate] = {}
     if spec.simulation is not None and not static_only:
-        most = spec.simulation.survivors_max
-        chosen = survivors(predictions, front, picked.judged.index, most)
+        chosen = survivors(judged, front, picked.judged, spec)
         told_of = {int(i): predictions[i].candidate for i in chosen}
         simulated = simulate_candidates(spec, told_of, home, seed, pool or Pool(), count)
     if simulated:

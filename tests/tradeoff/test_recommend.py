@@ -101,11 +101,18 @@ def test_a_failed_run_keeps_a_candidate_from_being_recommended(prediction: Predi
     assert recommend([lost, judged_at(prediction, 0.002, 7.0, 1)], spec).judged.index == 1
 
 
-def test_survivors_are_the_recommended_one_and_the_front_thinned(prediction: Prediction) -> None:
-    """Both ends of the front stay."""
-    ones = [at_ratio(prediction, 0.001 * (i + 1)) for i in range(20)]
-    chosen = survivors(ones, np.arange(5, 20), 2, 4)
-    assert chosen.tolist() == [2, 5, 12, 19]
+def test_survivors_are_those_near_the_decision_and_the_front_thinned(
+    prediction: Prediction,
+) -> None:
+    """Nearest in cost of those that could meet 0.8 % with a spread of 1.96; ends of the front."""
+    spec = spec_of(simulation={"recordings": ["x.rrd"], "survivors_max": 6})
+    ones = [judged_at(prediction, 0.0003 * (i + 1), 20.0 / (i + 1), i) for i in range(20)]
+    first = recommend(ones, spec).judged
+    assert first.index == 8
+    chosen = survivors(ones, np.arange(0, 20, 2), first, spec)
+    assert chosen.tolist() == [0, 7, 8, 9, 10, 18]
+    few = spec_of(simulation={"recordings": ["x.rrd"], "survivors_max": 1})
+    assert survivors(ones, np.arange(0, 20, 2), first, few).tolist() == [8]
 
 
 def test_constraints_that_nothing_keeps_to_are_one_sentence(prediction: Prediction) -> None:
