@@ -30,20 +30,14 @@ from rich.progress import track
 from estimators import build_estimator
 from lpet_sim.evaluation import RunResult, evaluate, failed
 from lpet_sim.evaluation.bounds import end_bound
-from lpet_sim.evaluation.consistency import anees
-from lpet_sim.evaluation.statistics import Interval, bootstrap
 from lpet_sim.outputs import output_folder, whole_file
-from lpet_sim.recording.arrays import Array
-from lpet_sim.rng import stream
 from lpet_sim.sensors.s_curve import SCurveSpec, s_curve_run
 from lpet_sim.study.one_traverse import SCENARIOS
-
-Row = dict[str, Any]
+from scenarios.metres.tables import DOF, Row, markdown
 
 COMMAND: Final = "python -m scenarios.hundred_metres"
 CACHE: Final = Path("out/experiments")
 SEEDS: Final = range(1, 51)
-DOF: Final = {"position": 3, "attitude": 3, "pose": 6}
 PEERS: Final = ("GTSAM fixed lag 10, covariance of every image", "GTSAM fixed lag 10")
 
 
@@ -174,89 +168,7 @@ def _row(seed: int, method: Method, result: RunResult, spent_ms: float, landmark
     }
 
 
-def rms(values: Array, axis: int = -1) -> Array:
-    """Give the root of the mean square."""
-    return np.asarray(np.sqrt(np.mean(np.square(values), axis=axis)))
-
-
-def markdown(rows: list[Row], spec: SCurveSpec) -> list[str]:
-    """Write the table of all methods beside the bound."""
-    seeds = len({row["seed"] for row in rows})
-    bound = {row["seed"]: row for row in rows}.values()
-    percent = 100 * float(rms(np.array([row["bound_m"] / row["distance_m"] for row in bound])))
-    degrees = float(rms(np.array([row["bound_deg"] for row in bound])))
-    sighted = float(np.mean([row["sightings"] for row in bound]))
-    bands = "; ".join(
-        f"{name} {_band(anees(np.ones(seeds), dof).low, anees(np.ones(seeds), dof).high)}"
-        for name, dof in DOF.items()
-    )
-    lines = [
-        "# A hundred ideal metres",
-        "",
-        f"`{COMMAND}`, {seeds} seeds, {spec.images} images, {sighted:.0f} sightings an image; see "
-        "`lpet_sim/sensors/s_curve.py` for the set-up. Errors at the end of the run, RMS over the "
-        f"seeds. Cramer-Rao bound at the truth: {percent:.4f} % of the distance, {degrees:.4f} "
-        "deg. Efficiency is the RMS of error over bound, seed by seed; below 1 beyond its interval "
-        "an estimator would have seen the truth. Intervals are 95 % bootstraps over seeds. ANEES "
-        f"of a consistent estimator, 95 % band for {seeds} seeds: {bands}. Time is that of the "
-        "processor on one thread, the median over seeds; beside it how many times as long GTSAM's "
-        "fixed lag takes, with a covariance of every image, as the filters give it, and without.",
-        "",
-        "| estimator | seeds | failed | end % | attitude deg | efficiency, position | attitude "
-        "| ANEES position | attitude | pose | ms/image | GTSAM's over it | landmarks held |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    groups = [[row for row in rows if row["method"] == method.name] for method in METHODS]
-    peers = [[row["ms_per_image"] for row in rows if row["method"] == peer] for peer in PEERS]
-    peer_ms = [float(np.median(spent)) if spent else math.nan for spent in peers]
-    return lines + [_line(group, peer_ms) for group in groups if group]
-
-
-def _line(rows: list[Row], peer_ms: list[float]) -> str:
-    """Write one method's line."""
-    rng = stream(0, "hundred_metres", "bootstrap")
-
-    def interval(name: str, over: str, factor: float = 1.0) -> str:
-        values = np.array([factor * row[name] / row[over] for row in rows])
-        return _text(bootstrap(values, rng, rms)) if np.isfinite(values).all() else "inf"
-
-    attitude = float(rms(np.array([row["end_deg"] for row in rows])))
-    spent, landmarks = _median(rows, "ms_per_image"), _median(rows, "landmarks")
-    cells = [
-        rows[0]["method"],
-        str(len(rows)),
-        str(sum(bool(row["failure"]) for row in rows)),
-        interval("end_m", "distance_m", 100.0),
-        f"{attitude:.4f}",
-        interval("end_m", "bound_m"),
-        interval("end_deg", "bound_deg"),
-        *(_consistency(rows, name) for name in DOF),
-        f"{spent:.2f}",
-        " / ".join(f"{peer / spent:.1f}" for peer in peer_ms),
-        f"{landmarks:.0f}" if math.isfinite(landmarks) else "-",
-    ]
-    return "| " + " | ".join(cells) + " |"
-
-
-def _consistency(rows: list[Row], name: str) -> str:
-    """Write an ANEES, in bold where it is inside its band."""
-    found = anees([row[f"nees_{name}"] for row in rows], DOF[name])
-    return f"**{found.value:.2f}**" if found.is_consistent else f"{found.value:.2f}"
-
-
-def _median(rows: list[Row], name: str) -> float:
-    return float(np.median([row[name] for row in rows]))
-
-
-def _band(low: float, high: float) -> str:
-    return f"{low:.2f} to {high:.2f}"
-
-
-def _text(interval: Interval) -> str:
-    return f"{interval.value:.3f} ({_band(interval.low, interval.high)})"
-
-
-def write_tables(rows: list[Row], spec: SCurveSpec, folder: Path) -> list[Path]:
+def write_tables(rows: list[Row], text: str, folder: Path) -> list[Path]:
     """Write the rows as CSV and their summary as Markdown."""
     table, summary = folder / "hundred_metres.csv", folder / "hundred_metres.md"
     with whole_file(table) as temporary, temporary.open("w", newline="") as file:
@@ -266,7 +178,7 @@ def write_tables(rows: list[Row], spec: SCurveSpec, folder: Path) -> list[Path]:
             {k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows
         )
     with whole_file(summary) as temporary:
-        temporary.write_text("\n".join(markdown(rows, spec)) + "\n")
+        temporary.write_text(text)
     return [table, summary]
 
 
@@ -294,8 +206,9 @@ def main() -> None:
     order = [method.name for method in METHODS]
     rows.sort(key=lambda row: (order.index(row["method"]), row["seed"]))
     folder = options.out or (CACHE if options.quick else Path("docs/results"))
-    paths = write_tables(rows, spec, output_folder(folder))
-    print("\n".join(markdown(rows, spec)))
+    text = "\n".join(markdown(rows, spec, COMMAND, order, PEERS)) + "\n"
+    paths = write_tables(rows, text, output_folder(folder))
+    print(text, end="")
     for path in paths:
         print(f"wrote {path}")
 
