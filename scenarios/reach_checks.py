@@ -21,7 +21,7 @@ from typing import Any, Final
 
 from rich.progress import track
 
-from lpet_sim.outputs import whole_file
+from lpet_sim.outputs import output_folder, whole_file
 from lpet_sim.planning.mobility_map import map_mobility
 from lpet_sim.planning.reach import ROCKS, Reacher
 from lpet_sim.planning.reach_figures import draw_rates
@@ -209,7 +209,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("docs/results"))
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
-    quick, workers, folder = arguments.quick, arguments.workers, arguments.out
+    quick, workers, folder = arguments.quick, arguments.workers, output_folder(arguments.out)
     cache = folder / "cache" if quick else CACHE
     totals = [
         check_all(thousand(quick, straddles), cache / f"checks{straddles:d}", workers)
