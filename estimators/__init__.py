@@ -17,6 +17,7 @@ from estimators.protocol import Estimator
 from estimators.slam import Slam
 from estimators.slam_spec import SlamSpec
 from lpet_sim.errors import UnknownNameError
+from lpet_sim.plugins.python_plugin import describe, plugin_builder, plugin_names
 from lpet_sim.spec import Spec
 
 Registry = dict[str, tuple[type[Spec], Callable[[Any], Estimator]]]
@@ -36,24 +37,43 @@ PEERS: Registry = {
 }
 """Those of other libraries, which run only where they are named: extra ``peers``."""
 
+OUTSIDE: Registry = {}
+"""Programs in any language, which run only where they are named."""
+
+
+def estimator_kind(name: str) -> tuple[type[Spec], Callable[[Any], Estimator]]:
+    """Give the type of an estimator's spec, and what builds it from one.
+
+    Args:
+        name: One of `ESTIMATORS`, `PEERS` or `OUTSIDE`, of a plug-in that is installed, or
+            ``module:Class``.
+
+    Raises:
+        UnknownNameError: No estimator has this name; the sentence lists those there are.
+        SpecError: A plug-in cannot be imported or is no estimator.
+    """
+    known = ESTIMATORS | PEERS | OUTSIDE
+    if name in known:
+        return known[name]
+    if ":" not in name and name not in plugin_names():
+        raise UnknownNameError("estimator", name, [*known, *plugin_names()])
+    return describe(name).spec, plugin_builder(name)
+
 
 def build_estimator(name: str, spec: dict[str, Any] | None = None) -> Estimator:
     """Build an estimator.
 
     Args:
-        name: One of `ESTIMATORS` or `PEERS`.
+        name: See `estimator_kind`.
         spec: Fields of its spec as read from YAML; what is not given has its default.
 
     Raises:
         UnknownNameError: No estimator has this name; the sentence lists those there are.
-        SpecError: An unknown key or a bad value.
+        SpecError: An unknown key or a bad value, or a plug-in that cannot be imported.
         LpetError: A peer's library is not installed.
     """
-    known = ESTIMATORS | PEERS
-    if name not in known:
-        raise UnknownNameError("estimator", name, known)
-    kind, build = known[name]
+    kind, build = estimator_kind(name)
     return build(kind.from_mapping(spec or {}, source=name))
 
 
-__all__ = ["ESTIMATORS", "PEERS", "Estimator", "build_estimator"]
+__all__ = ["ESTIMATORS", "OUTSIDE", "PEERS", "Estimator", "build_estimator", "estimator_kind"]

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.streams import Measurements
 
 
 class Estimator(Protocol):
-    """Anything that turns measurements into a trajectory.
+    """Anything that turns measurements into a trajectory."""
 
-    Attributes:
-        needs: Names of the streams that it cannot do without, such as ``wheels``.
-    """
-
-    needs: ClassVar[tuple[str, ...]]
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Names of the streams that it cannot do without, such as ``wheels``."""
+        ...
 
     @property
     def name(self) -> str:

@@ -43,3 +43,25 @@ class BlockedPlaceError(PlanningError):
 
 class BrokenFilterError(LpetError):
     """A filter whose covariance is no longer positive definite: the run ends here."""
+
+
+class TimesError(RecordingError):
+    """Times that do not increase strictly."""
+
+
+class LengthsError(RecordingError):
+    """Arrays that belong together but differ in length."""
+
+
+class EstimatorFaultError(LpetError):
+    """An estimator of somebody else's that went wrong: its run ends here, and nothing else.
+
+    Attributes:
+        kind: The kind of failure, one of `lpet_sim.evaluation.result.FAULTS` or of the kinds that
+            every run may end with.
+    """
+
+    def __init__(self, kind: str, text: str) -> None:
+        """Keep the kind beside the sentence."""
+        super().__init__(text)
+        self.kind = kind

@@ -12,7 +12,16 @@ from lpet_sim.kernel_cache import MARK
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("lpet_sim", "estimators")
 
-FOUNDATION = {"errors", "rng", "spec", "datasets", "outputs", "progress", "kernel_cache"}
+FOUNDATION = {
+    "errors",
+    "failures",
+    "rng",
+    "spec",
+    "datasets",
+    "outputs",
+    "progress",
+    "kernel_cache",
+}
 PHYSICAL = {"soil", "terrain", "rover", "sensors", "planning", "rig"}
 MAY_IMPORT: dict[str, set[str]] = {
     "foundation": set(),
@@ -20,7 +29,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "recording": {"foundation", "geometry"},
     "vision": {"foundation", "geometry", "recording"},
     "evaluation": {"foundation", "geometry", "recording"},
-    "estimators": {"foundation", "geometry", "recording", "evaluation"},
+    "estimators": {"foundation", "geometry", "recording", "evaluation", "plugins"},
+    "plugins": {"foundation", "geometry", "recording"},
     "soil": {"foundation", "geometry", "recording"},
     "terrain": {"foundation", "geometry", "recording", "soil"},
     "rover": {"foundation", "geometry", "recording", "soil", "terrain"},

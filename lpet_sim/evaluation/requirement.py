@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from lpet_sim.evaluation.errors import worst_position_ratio
-from lpet_sim.evaluation.result import BROKEN, RunResult
+from lpet_sim.evaluation.result import RunResult
+from lpet_sim.failures import BROKEN
 from lpet_sim.spec import Spec
 
 AXES = ("roll", "pitch", "yaw")

@@ -17,6 +17,14 @@ from lpet_sim.evaluation.errors import (
     segment_drift,
     worst_position_ratio,
 )
+from lpet_sim.failures import (
+    BAD_COVARIANCE,
+    DIVERGED,
+    EXCEPTION,
+    INCOMPLETE,
+    LOST,
+    NOT_FINITE,
+)
 from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.trajectory import Trajectory
@@ -24,11 +32,6 @@ from lpet_sim.recording.truth import Truth
 from lpet_sim.spec import Spec
 
 Triple = tuple[float, float, float]
-INCOMPLETE, DIVERGED, NOT_FINITE = "incomplete", "diverged", "not_finite"
-BAD_COVARIANCE, LOST, EXCEPTION = "bad_covariance", "lost", "exception"
-TIMEOUT = "timeout"
-BROKEN = frozenset({NOT_FINITE, BAD_COVARIANCE, LOST, EXCEPTION, TIMEOUT})
-"""Failures that no small error makes up for."""
 
 
 class EvaluationSpec(Spec):
@@ -58,8 +61,8 @@ class RunResult:
         distance_m: Length of the part of the traverse that is scored [m].
         completion: Share of that distance that the estimate covers.
         failure: None, or the first that applies of ``exception``, ``timeout`` (in a sweep that
-            sets a time limit), ``not_finite``, ``incomplete``, ``bad_covariance``, ``lost`` and
-            ``diverged``.
+            sets a time limit), `FAULTS`, ``not_finite``, ``incomplete``, ``bad_covariance``,
+            ``lost`` and ``diverged``.
         failure_text: One sentence on the failure.
         endpoint_error_m: ``p_est - p_true`` at the last estimate, in the world [m].
         endpoint_ratio: Its length over the distance driven by then.

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from lpet_sim.errors import RecordingError
+from lpet_sim.errors import LengthsError, TimesError
 from lpet_sim.geometry import SE3
 
 Array = NDArray[np.float64]
@@ -26,7 +26,8 @@ class ArrayStruct:
         """Make every array read-only and hold them all to the length of ``t_ns``.
 
         Raises:
-            RecordingError: Lengths differ, or the times do not increase.
+            LengthsError: Lengths differ.
+            TimesError: The times do not increase.
         """
         for field in fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
@@ -35,7 +36,7 @@ class ArrayStruct:
             if isinstance(value, np.ndarray | SE3) and field.name not in self.ragged_fields():
                 self._check_length(field.name, len(value))
         if np.any(np.diff(self.t_ns) <= 0):
-            raise RecordingError(f"{type(self).__name__}: times must increase strictly")
+            raise TimesError(f"{type(self).__name__}: times must increase strictly")
 
     @classmethod
     def ragged_fields(cls) -> frozenset[str]:
@@ -44,7 +45,7 @@ class ArrayStruct:
 
     def _check_length(self, name: str, length: int) -> None:
         if length != len(self.t_ns):
-            raise RecordingError(
+            raise LengthsError(
                 f"{type(self).__name__}.{name} has {length} rows but t_ns has {len(self.t_ns)}: "
                 "they must be equal"
             )

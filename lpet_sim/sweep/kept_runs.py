@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from estimators import build_estimator
-from lpet_sim.errors import BrokenFilterError
+from lpet_sim.errors import BrokenFilterError, EstimatorFaultError
 from lpet_sim.evaluation import EvaluationSpec, RunResult, evaluate, failed
-from lpet_sim.evaluation.result import BAD_COVARIANCE, EXCEPTION
+from lpet_sim.failures import BAD_COVARIANCE, EXCEPTION
 from lpet_sim.outputs import whole_file
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.recording import Recording
@@ -94,6 +94,7 @@ def run_kept(job: Job, recording: Recording, folder: Path) -> Row:
     except Exception as error:
         _log.warning("%s: %s", job.label, error)
         kind = BAD_COVARIANCE if isinstance(error, BrokenFilterError) else EXCEPTION
+        kind = error.kind if isinstance(error, EstimatorFaultError) else kind
         return _named(job, failed(job.label, kind, f"{type(error).__name__}: {error}"))
     row = score_row(job, recording, estimate) | {"time_s": time.perf_counter() - begin}
     with whole_file(file) as temporary:

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from estimators import build_estimator
-from lpet_sim.errors import BrokenFilterError
+from lpet_sim.errors import BrokenFilterError, EstimatorFaultError
 from lpet_sim.evaluation import EvaluationSpec, Requirement, RunResult, evaluate, failed
 from lpet_sim.evaluation.errors import distance_driven_m
-from lpet_sim.evaluation.result import BAD_COVARIANCE, EXCEPTION, TIMEOUT
+from lpet_sim.failures import BAD_COVARIANCE, EXCEPTION, TIMEOUT
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.streams import Measurements
 from lpet_sim.recording.truth import Truth
@@ -178,6 +178,8 @@ def _outcome(run: PlannedRun, scene: Scene, settings: RunSettings) -> _Outcome:
         return _Outcome(result, spent_s, estimate)
     except TimeLimitError:
         kind, text = TIMEOUT, f"stopped after {settings.redo.time_limit_s:g} s"
+    except EstimatorFaultError as fault:
+        kind, text = fault.kind, str(fault)
     except BrokenFilterError as error:
         kind, text = BAD_COVARIANCE, str(error)
     except Exception as error:

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import lpet_sim
-from estimators import ESTIMATORS, PEERS, build_estimator
-from lpet_sim.errors import SpecError, UnknownNameError
+from estimators import build_estimator, estimator_kind
+from lpet_sim.errors import SpecError
 from lpet_sim.spec import Spec
 from lpet_sim.sweep.sweep_spec import ArmSpec, SweepSpec, VariantSpec
 
@@ -24,6 +24,7 @@ _ROOT = Path(lpet_sim.__file__).resolve().parents[1]
 _RUN_CODE = (
     "estimators/**/*.py",
     "lpet_sim/geometry/*.py",
+    "lpet_sim/plugins/*.py",
     "lpet_sim/evaluation/errors.py",
     "lpet_sim/evaluation/result.py",
     "lpet_sim/evaluation/requirement.py",
@@ -101,10 +102,7 @@ def _drafts(variant: VariantSpec, number: int) -> Iterator[_Draft]:
 
 def _built(variant: VariantSpec, chosen: Mapping[str, Any], source: str) -> Spec:
     """Put the chosen values into the spec, validate it, and see that the estimator can be built."""
-    known = ESTIMATORS | PEERS
-    if variant.estimator not in known:
-        raise UnknownNameError("estimator", variant.estimator, known)
-    kind, _ = known[variant.estimator]
+    kind, _ = estimator_kind(variant.estimator)
     mapping, defaults = deepcopy(variant.spec), kind().to_mapping()
     for path, value in chosen.items():
         _put(mapping, defaults, path.split("."), value, f"{source}: sweep of '{path}'")

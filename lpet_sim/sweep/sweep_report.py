@@ -22,11 +22,11 @@ from lpet_sim.evaluation.families import paper_pairs, size_families
 from lpet_sim.evaluation.figures import save
 from lpet_sim.evaluation.ordering import paired_orderings
 from lpet_sim.evaluation.requirement import AXES
-from lpet_sim.evaluation.result import BROKEN
 from lpet_sim.evaluation.row_sheets import ordering_sheet, size_sheet, summary_sheets
 from lpet_sim.evaluation.rows import Rows
 from lpet_sim.evaluation.sheet import Sheet
 from lpet_sim.evaluation.summary import Summary, summarise
+from lpet_sim.failures import BROKEN
 from lpet_sim.outputs import output_folder, whole_file
 from lpet_sim.progress import Progress, silent
 

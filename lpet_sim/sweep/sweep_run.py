@@ -15,7 +15,7 @@ from typing import Final
 
 import lpet_sim
 from lpet_sim.errors import LpetError, OutputError, SpecError
-from lpet_sim.evaluation.result import EXCEPTION
+from lpet_sim.failures import EXCEPTION
 from lpet_sim.outputs import output_folder
 from lpet_sim.progress import Count, Progress, silent, uncounted
 from lpet_sim.sweep.sweep_agenda import PlannedRow, jobs_of, plan_rows, rows_of

@@ -19,7 +19,7 @@ from typing import Any, Final, Self
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from lpet_sim.evaluation.result import EXCEPTION, TIMEOUT
+from lpet_sim.failures import EXCEPTION, FAULTS, TIMEOUT
 from lpet_sim.outputs import whole_file
 
 TIMING: Final = ("time_total_s", "time_per_image_ms", "cold", "worker", "started_at")
@@ -45,7 +45,7 @@ class Redo:
         """Tell whether a row's run is run again."""
         if row["failure"] == TIMEOUT and row["time_limit_s"] != self.time_limit_s:
             return True
-        again = row["failure"] in (TIMEOUT, EXCEPTION)
+        again = row["failure"] in {TIMEOUT, EXCEPTION, *FAULTS}
         return bool(again and row["started_at"] < self.failed_before)
 
 
