@@ -34,7 +34,9 @@ def stamp_of_text(text: str) -> int:
     """
     found = _SECONDS.fullmatch(text.strip())
     if found is None or not (found[2] or found[3]):
-        raise RecordingError(f"'{text}' is no time; seconds are expected, as in 1403636579.763555584")
+        raise RecordingError(
+            f"'{text}' is no time; seconds are expected, as in 1403636579.763555584"
+        )
     sign, whole, part, power = found[1], found[2] or "", found[3] or "", int(found[4] or 0)
     shift = _DIGITS + power - len(part)
     digits = int(whole + part or "0")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lpet_sim.errors import RecordingError
 from lpet_sim.formats import asl
 from lpet_sim.formats.clock import EPOCH_NS
 from lpet_sim.formats.csv_files import write_csv, write_names, write_stream
@@ -55,7 +56,12 @@ def write_measurements(
         measurements: What to write.
         folder: A folder that exists; ``mav0`` is made in it.
         progress: Called after each image pair.
+
+    Raises:
+        RecordingError: There are images, but no stereo camera is declared.
     """
+    if measurements.images is not None and measurements.calibration.stereo is None:
+        raise RecordingError("the recording has images but declares no stereo camera")
     root = folder / asl.ROOT
     root.mkdir()
     declared = measurements.calibration
