@@ -27,6 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "foundation": set(),
     "geometry": set(),
     "recording": {"foundation", "geometry"},
+    "formats": {"foundation", "geometry", "recording"},
     "vision": {"foundation", "geometry", "recording"},
     "evaluation": {"foundation", "geometry", "recording"},
     "estimators": {"foundation", "geometry", "recording", "evaluation", "plugins"},

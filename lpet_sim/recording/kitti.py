@@ -10,7 +10,9 @@ Reference:
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,7 @@ from lpet_sim.errors import RecordingError
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
 from lpet_sim.recording.calibration import Calibration, PoseSpec, StereoCalibration
+from lpet_sim.recording.png import decode_png, is_moved_up
 from lpet_sim.recording.recording import Manifest, Recording
 from lpet_sim.recording.streams import Measurements
 from lpet_sim.recording.truth import BodyTruth, Truth
@@ -116,7 +119,11 @@ def read_grey(path: Path) -> NDArray[Any]:
         RecordingError: The file is no image, or it is in colour.
     """
     try:
-        with Image.open(path) as image:
+        data = path.read_bytes()
+        if is_moved_up(data):
+            with suppress(RecordingError):
+                return decode_png(data)
+        with Image.open(BytesIO(data)) as image:
             pixels = np.asarray(image)
     except OSError as error:
         raise RecordingError(f"cannot read {path}: {error}; a grey PNG is expected") from None

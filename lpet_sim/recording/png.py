@@ -50,6 +50,11 @@ def encode_png(image: NDArray[Any]) -> bytes:
     return head + _chunk(b"IDAT", body) + _chunk(b"IEND", b"")
 
 
+def is_moved_up(data: bytes) -> bool:
+    """Tell whether a PNG may be one of `encode_png` whose values of 12 bits were moved up."""
+    return data[37:41] == b"sBIT"
+
+
 def decode_png(data: bytes | memoryview) -> NDArray[Any]:
     """Decode an image written by `encode_png`.
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lpet_sim.geometry import SE3
+from lpet_sim.progress import Progress, silent, track
 from lpet_sim.recording import layout
 from lpet_sim.recording.arrays import ArrayStruct, Ints
 from lpet_sim.recording.buffers import ColumnBuffers, ImageBuffer
@@ -180,13 +181,16 @@ class RecordingWriter:
         self._store.commit()
 
 
-def write_recording(path: Path | str, recording: Recording, keep_images: int = 1) -> None:
-    """Write a whole recording at once.
+def write_recording(
+    path: Path | str, recording: Recording, keep_images: int = 1, progress: Progress = silent
+) -> None:
+    """Write a whole recording at once, its images one pair at a time.
 
     Args:
         path: The final name, ending in .rrd.
         recording: What to write.
         keep_images: 1 keeps all image pairs, n every n-th, 0 none.
+        progress: Called after each pair.
 
     Raises:
         OutputError: The folder cannot be written.
@@ -202,7 +206,8 @@ def write_recording(path: Path | str, recording: Recording, keep_images: int = 1
         if measurements.odometry is not None:
             out.log_odometry(measurements.odometry)
         if measurements.images is not None:
-            for index, t_ns in enumerate(measurements.images.t_ns):
+            times = measurements.images.t_ns
+            for index, t_ns in track(enumerate(times), len(times), progress):
                 out.log_images(int(t_ns), *measurements.images.pair(index))
         if measurements.sightings is not None:
             out.log_sightings(measurements.sightings)
