@@ -17,6 +17,7 @@ from estimators.protocol import Estimator
 from estimators.slam import Slam
 from estimators.slam_spec import SlamSpec
 from lpet_sim.errors import UnknownNameError
+from lpet_sim.plugins.program import Program, ProgramSpec
 from lpet_sim.plugins.python_plugin import describe, plugin_builder, plugin_names
 from lpet_sim.spec import Spec
 
@@ -37,7 +38,7 @@ PEERS: Registry = {
 }
 """Those of other libraries, which run only where they are named: extra ``peers``."""
 
-OUTSIDE: Registry = {}
+OUTSIDE: Registry = {"program": (ProgramSpec, Program)}
 """Programs in any language, which run only where they are named."""
 
 

@@ -31,7 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "vision": {"foundation", "geometry", "recording"},
     "evaluation": {"foundation", "geometry", "recording"},
     "estimators": {"foundation", "geometry", "recording", "evaluation", "plugins"},
-    "plugins": {"foundation", "geometry", "recording"},
+    "plugins": {"foundation", "geometry", "recording", "formats"},
     "soil": {"foundation", "geometry", "recording"},
     "terrain": {"foundation", "geometry", "recording", "soil"},
     "rover": {"foundation", "geometry", "recording", "soil", "terrain"},

@@ -193,7 +193,14 @@ def _confinement(value: str) -> Confinement:
     ours = [str(_HERE / name) for name in ("lpet_sim", "estimators")]
     kernels = [str(_HERE / "lpet_sim" / "__pycache__"), os.environ.get("NUMBA_CACHE_DIR", "")]
     writable = tuple(place for place in kernels if place)
-    return Confinement((*source, *ours), tuple(_search_path()), writable)
+    return Confinement((*source, *ours, *_metadata()), tuple(_search_path()), writable)
+
+
+def _metadata() -> list[str]:
+    """Give what says which packages are installed: libraries look for their own plug-ins there."""
+    places = [Path(place) for place in _search_path()]
+    kinds = ("*.dist-info", "*.egg-info")
+    return [str(found) for place in places for kind in kinds for found in place.glob(kind)]
 
 
 def _sources(value: str) -> list[Path]:

@@ -7,10 +7,14 @@ from typing import Any
 
 import pytest
 
+from estimators import build_estimator
+from lpet_sim.errors import SpecError, UnknownNameError
 from lpet_sim.failures import FAULTS
+from lpet_sim.recording.reader import read_measurements
 from lpet_sim.sweep.sweep_pool import Pool
 from lpet_sim.sweep.sweep_run import run_sweep
 from lpet_sim.sweep.sweep_spec import SweepSpec
+from tests.plugins.examples import straight
 from tests.sweep.tiny_recordings import without_timing, write_tiny
 
 WRONG = "tests.plugins.wrongdoers:Wrong"
@@ -54,9 +58,10 @@ def rows_of(recording: Path, variants: list[dict[str, Any]], folder: Path) -> li
 
 
 def test_each_way_of_going_wrong_has_its_failure_and_the_other_rows_are_untouched(
-    recording: Path, tmp_path: Path
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Seventeen wrongdoers between two runs that are as they are without them."""
+    straight(monkeypatch)
     places = {"seeks_truth": recording.parent, "opens_truth": recording}
     wrong = [
         {
@@ -73,7 +78,7 @@ def test_each_way_of_going_wrong_has_its_failure_and_the_other_rows_are_untouche
     ]
     good: list[dict[str, Any]] = [
         {"estimator": "dead_reckoning"},
-        {"estimator": "tests.plugins.wrongdoers:Straight", "name": "straight"},
+        {"estimator": "straight:Straight", "name": "straight"},
     ]
     alone = rows_of(recording, good, tmp_path / "alone")
     among = rows_of(recording, [good[0], *wrong, good[1]], tmp_path / "among")
@@ -87,15 +92,23 @@ def test_each_way_of_going_wrong_has_its_failure_and_the_other_rows_are_untouche
     assert str(recording.parent) in failures["seeks_truth"][1]
 
 
-def test_a_plug_in_does_what_it_does_here(recording: Path) -> None:
+def test_a_plug_in_does_what_it_does_here(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its parameters reach it, and its estimate comes back to the bit."""
-    from estimators import build_estimator
-    from lpet_sim.recording.reader import read_measurements
-    from tests.plugins.wrongdoers import Straight
-
-    measurements = read_measurements(recording)
-    apart = build_estimator("tests.plugins.wrongdoers:Straight", {"scale": 0.5})
+    here, measurements = straight(monkeypatch)(0.5), read_measurements(recording)
+    apart = build_estimator("straight:Straight", {"scale": 0.5})
     assert apart.needs == ("wheels",)
-    found = apart.estimate(measurements).trajectory
-    here = Straight(0.5).estimate(measurements).trajectory
-    assert found.equals(here)
+    found = apart.estimate(measurements)
+    assert found.trajectory.equals(here.estimate(measurements).trajectory)
+
+
+def test_what_is_no_estimator_is_told_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module that is not there, a class that is not, and a parameter that is not."""
+    straight(monkeypatch)
+    with pytest.raises(SpecError, match="there is no module 'nowhere': install it, or run where"):
+        build_estimator("nowhere:Thing")
+    with pytest.raises(SpecError, match=r"straight:Crooked.*has no attribute 'Crooked'"):
+        build_estimator("straight:Crooked")
+    with pytest.raises(SpecError, match=r"unknown key 'size'; valid keys are .*scale"):
+        build_estimator("straight:Straight", {"size": 2})
+    with pytest.raises(UnknownNameError, match="choose one of dead_reckoning"):
+        build_estimator("crooked")

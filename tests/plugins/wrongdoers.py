@@ -1,4 +1,4 @@
-"""Estimators that go wrong in a way each, and two that do not."""
+"""Estimators that go wrong in a way each."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from estimators.dead_reckoning import DeadReckoning
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.reader import read_recording
@@ -18,37 +19,18 @@ from lpet_sim.recording.streams import Measurements
 from lpet_sim.recording.trajectory import Trajectory
 
 
-class Straight:
-    """Drives straight on: the wheels' mean way along the first heading."""
-
-    name = "straight"
-    needs: ClassVar[tuple[str, ...]] = ("wheels",)
-
-    def __init__(self, scale: float = 1.0) -> None:
-        self.scale = scale
-
-    def estimate(self, measurements: Measurements) -> Estimate:
-        """Give a pose for each reading."""
-        wheels, calibration = measurements.wheels, measurements.calibration
-        assert wheels is not None and calibration.wheels is not None
-        turned = wheels.drive_angle_rad.mean(axis=1) - wheels.drive_angle_rad[0].mean()
-        start = calibration.T_world_body_start.se3()
-        way = np.zeros((len(turned), 3))
-        way[:, 0] = self.scale * calibration.wheels.radius_m * turned
-        poses = SE3(np.broadcast_to(np.eye(3), (len(turned), 3, 3)).copy(), way)
-        return Estimate("straight", Trajectory(wheels.t_ns.copy(), start @ poses))
-
-
-class Wrong(Straight):
+class Wrong:
     """Goes wrong as it is told."""
 
+    name = "wrong"
+    needs: ClassVar[tuple[str, ...]] = ("wheels",)
+
     def __init__(self, how: str = "crash", place: str = "/") -> None:
-        super().__init__()
         self.how, self.place = how, Path(place)
 
     def estimate(self, measurements: Measurements) -> Estimate:
         """Go wrong."""
-        good = super().estimate(measurements)
+        good = DeadReckoning().estimate(measurements)
         bad: Callable[[Estimate], Any] = getattr(self, f"_{self.how}")
         return bad(good)
 
@@ -133,7 +115,7 @@ def _opens(path: Path) -> bool:
 def _truth_in(path: Path) -> Estimate:
     truth = read_recording(path).truth
     assert truth is not None
-    return Estimate("straight", truth.body)  # type: ignore[arg-type]
+    return Estimate("wrong", truth.body)  # type: ignore[arg-type]
 
 
 def _moved(good: Estimate, p: np.ndarray[Any, Any]) -> Estimate:
