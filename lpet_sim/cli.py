@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from lpet_sim.cli_estimator import check_estimator
 from lpet_sim.cli_reach import reach
 from lpet_sim.cli_report import report
 from lpet_sim.cli_rig import rig_app
@@ -37,6 +38,7 @@ app.command()(study)
 app.command()(report)
 app.command()(sweep)
 app.command()(tradeoff)
+app.command("check-estimator")(check_estimator)
 
 RecordingArgument = Annotated[Path, typer.Argument(metavar="RUN.rrd", help="A recording.")]
 SeedOption = Annotated[int, typer.Option(help="Seed of everything random.")]

@@ -30,8 +30,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "formats": {"foundation", "geometry", "recording"},
     "vision": {"foundation", "geometry", "recording"},
     "evaluation": {"foundation", "geometry", "recording"},
-    "estimators": {"foundation", "geometry", "recording", "evaluation", "plugins"},
     "plugins": {"foundation", "geometry", "recording", "formats"},
+    "estimators": {"foundation", "geometry", "recording", "evaluation", "plugins"},
     "soil": {"foundation", "geometry", "recording"},
     "terrain": {"foundation", "geometry", "recording", "soil"},
     "rover": {"foundation", "geometry", "recording", "soil", "terrain"},
@@ -53,6 +53,7 @@ MAY_IMPORT["tradeoff"] = {*MAY_IMPORT}
 MAY_IMPORT["study"] = {*MAY_IMPORT}
 MAY_IMPORT["cli_rig"] = {*MAY_IMPORT} - {"study"}
 MAY_IMPORT["cli_report"] = {*MAY_IMPORT} - {"study", "cli_rig"}
+MAY_IMPORT["cli_estimator"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report"}
 MAY_IMPORT["cli_sweep"] = {*MAY_IMPORT} - {"study", "cli_rig"}
 MAY_IMPORT["cli_reach"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report", "cli_sweep"}
 MAY_IMPORT["cli_tradeoff"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report", "cli_sweep"}
@@ -86,6 +87,7 @@ QUARANTINE: dict[str, set[str]] = {
     "joblib": {"lpet_sim/sweep/sweep_pool.py"},
     "typer": {
         "lpet_sim/cli.py",
+        "lpet_sim/cli_estimator.py",
         "lpet_sim/cli_reach.py",
         "lpet_sim/cli_report.py",
         "lpet_sim/cli_rig.py",

@@ -94,8 +94,11 @@ def firm_slip(soil: FirmSoilSpec, demand: Array) -> Array:
         demand: ``|f| = |(x + rr, y)|``, Shape (n,).
     """
     most = -math.expm1(-SLIP_MAX * soil.slip_stiffness / soil.friction)
+    # On very stiff ground what is most rounds to all that friction gives.
+    most = min(most, math.nextafter(1.0, 0.0))
     share = np.minimum(demand / soil.friction, most)
-    return -soil.friction / soil.slip_stiffness * np.log1p(-share)
+    slip = -soil.friction / soil.slip_stiffness * np.log1p(-share)
+    return np.where(share < most, slip, SLIP_MAX)
 
 
 def _demand(soil: MeasuredSoilSpec) -> Array:

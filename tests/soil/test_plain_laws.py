@@ -95,6 +95,17 @@ def test_firm_ground_inverts_its_law() -> None:
     )
 
 
+def test_on_the_hardest_ground_a_wheel_slips_only_beyond_friction() -> None:
+    """As stiff as a soil may be: hardly any slip below it, all of it there, and no number lost."""
+    hard = FirmSoilSpec(
+        name="hard", evidence="assumed", source="none", friction=0.8, slip_stiffness=1000.0
+    )
+    found = firm_slip(hard, np.array([0.0, 0.5, 0.8, 1.0]))
+    assert found[0] == 0.0
+    assert found[1] == pytest.approx(8e-4 * np.log(8 / 3), rel=1e-12)
+    assert found[2:].tolist() == [SLIP_MAX, SLIP_MAX]
+
+
 def test_bedrock_stays_below_the_slip_seen_on_mars() -> None:
     """Under 10 % at 20 deg, and crust slips more than bedrock, rock less, sand most."""
     slip = [
