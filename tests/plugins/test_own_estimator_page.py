@@ -1,4 +1,4 @@
-"""The page on own estimators: its code is that of the examples, its YAML is taken, its table whole."""
+"""The page on own estimators: its code is the examples, its YAML is taken, its table whole."""
 
 from __future__ import annotations
 
