@@ -8,7 +8,7 @@ export PYOPENGL_PLATFORM ?= $(MUJOCO_GL)
 # The matrices are small: a second thread for each of two workers costs more than it gives.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test check bench experiments paper lock clean opengl env
+.PHONY: demo test check bench experiments paper docs lock clean opengl env
 
 env: $(STAMP)
 
@@ -47,6 +47,9 @@ experiments: opengl
 
 paper: $(STAMP) ## the paper's experiment: hours; goes on where it was
 	$(BIN)/python -m scenarios.paper_experiment
+
+docs: $(STAMP) ## the site, in out/site
+	$(BIN)/mkdocs build -q
 
 lock: ## needs uv
 	uv pip compile --python-version 3.11 --extra dev --no-header --no-emit-index-url --no-annotate --upgrade pyproject.toml -o requirements.lock
