@@ -11,7 +11,8 @@ from typing import Any, Self
 
 from mcap.exceptions import McapError
 from mcap.reader import McapReader, make_reader
-from mcap.records import Schema, Summary
+from mcap.records import Schema
+from mcap.summary import Summary
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +135,7 @@ def _readers(
     }
     if calibration.wheels is not None:
         wanted = names.joint_names(calibration.wheels.names)
-        readers[where.joints] = lambda message, stamp: _joint_row(message, wanted)
+        readers[where.joints] = partial(_joint_row, wanted)
     return readers
 
 
@@ -144,7 +145,8 @@ def _imu_row(message: Any, stamp: int) -> tuple[int, list[float]]:
     return ros.stamp_of(message), [x for part in parts for x in ros.vector_of(part)]
 
 
-def _joint_row(message: Any, wanted: list[str]) -> tuple[int, list[float]]:
+def _joint_row(wanted: list[str], message: Any, stamp: int) -> tuple[int, list[float]]:
+    del stamp
     held = dict(zip(message.name, message.position, strict=True))
     missing = [name for name in wanted if name.endswith(names.DRIVE) and name not in held]
     if missing:
