@@ -30,21 +30,6 @@ from lpet_sim.recording.truth import BodyTruth, Event, in_order
 
 NAMES = topics.TopicsSpec()
 SIGHTING_COLUMNS = ("landmark_id", "u_left_px", "u_right_px", "v_px", "sigma_px")
-_FOREVER = {"sec": 9223372036, "nsec": 854775807}
-_LATCHED = [
-    {
-        "history": 1,
-        "depth": 1,
-        "reliability": 1,
-        "durability": 1,
-        "deadline": _FOREVER,
-        "lifespan": _FOREVER,
-        "liveliness": 1,
-        "liveliness_lease_duration": _FOREVER,
-        "avoid_ros_namespace_conventions": False,
-    }
-]
-"""A topic whose last message late listeners get, in the numbers of rosbag2's format 5."""
 
 
 class Message(NamedTuple):
@@ -249,10 +234,6 @@ def _metadata(span: Span, file: str) -> str:
 
 
 def _offered(topic: str, kind: str) -> dict[str, str]:
-    latched = yaml.safe_dump(_LATCHED, sort_keys=False) if topic == NAMES.tf_static else ""
-    return {
-        "name": topic,
-        "type": kind,
-        "serialization_format": "cdr",
-        "offered_qos_profiles": latched,
-    }
+    # Readers hold this to what the MCAP's channels say, and the library writes no profiles there.
+    profiles = {"serialization_format": "cdr", "offered_qos_profiles": ""}
+    return {"name": topic, "type": kind, **profiles}

@@ -93,7 +93,8 @@ def test_estimators_give_the_same_to_the_bit_on_what_came_back(name: str, tmp_pa
     read = read_recording(tmp_path / "back.rrd")
     for estimator in ("dead_reckoning", "frame_to_frame", "slam"):
         here, there = (
-            build_estimator(estimator).estimate(recording.measurements) for recording in (given, read)
+            build_estimator(estimator).estimate(recording.measurements)
+            for recording in (given, read)
         )
         assert here.trajectory.equals(there.trajectory)
         assert here.covariance is not None
