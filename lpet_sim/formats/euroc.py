@@ -28,6 +28,9 @@ from lpet_sim.recording.recording import Manifest, Recording
 from lpet_sim.recording.streams import ImuStream, Measurements, SightingStream, StereoImages
 from lpet_sim.recording.truth import BodyTruth, Truth
 
+_TABLES = 0.3
+"""Share of the work that tables are, about, where there are images."""
+
 
 def export_euroc(recording: Recording, folder: Path, progress: Progress = silent) -> None:
     """Write a recording as an ASL folder, images one pair at a time.
@@ -35,16 +38,17 @@ def export_euroc(recording: Recording, folder: Path, progress: Progress = silent
     Args:
         recording: What to write.
         folder: A folder that is made; ``mav0`` and Kalibr's files lie in it.
-        progress: Called after each pair.
+        progress: Called after the tables, then after each pair.
 
     Raises:
         OutputError: The folder is there already, or cannot be written.
     """
     with whole_folder(folder) as out:
-        write_measurements(recording.measurements, out, progress)
         write_kalibr(recording.measurements.calibration, out)
         if recording.truth is not None:
             _write_truth(recording.truth, recording.manifest, out / asl.ROOT)
+            progress(_TABLES / 2)
+        write_measurements(recording.measurements, out, progress)
 
 
 def write_measurements(
@@ -55,7 +59,7 @@ def write_measurements(
     Args:
         measurements: What to write.
         folder: A folder that exists; ``mav0`` is made in it.
-        progress: Called after each image pair.
+        progress: Called after the tables, then after each image pair.
 
     Raises:
         RecordingError: There are images, but no stereo camera is declared.
@@ -63,7 +67,7 @@ def write_measurements(
     if measurements.images is not None and measurements.calibration.stereo is None:
         raise RecordingError("the recording has images but declares no stereo camera")
     root = folder / asl.ROOT
-    root.mkdir()
+    root.mkdir(exist_ok=True)
     declared = measurements.calibration
     write_yaml(root / asl.ABOUT, asl.AboutSpec.of(declared, EPOCH_NS).to_mapping())
     if declared.stereo is not None:
@@ -73,8 +77,11 @@ def write_measurements(
     if declared.wheels is not None:
         write_yaml(_made(root / asl.WHEELS) / asl.SENSOR, asl.wheel_mapping(declared.wheels))
     _write_streams(measurements, root)
+    progress(_TABLES)
     if measurements.images is not None:
-        _write_images(measurements.images, root, progress)
+        rest = 1.0 - _TABLES
+        _write_images(measurements.images, root, lambda done: progress(_TABLES + rest * done))
+    progress(1.0)
 
 
 def _write_streams(measurements: Measurements, root: Path) -> None:

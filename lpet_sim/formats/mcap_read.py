@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from lpet_sim.formats.overrides import overridden
 from lpet_sim.formats.rows import Layout, Struct, unpack
 from lpet_sim.geometry import SE3
 from lpet_sim.progress import Progress, silent
-from lpet_sim.recording.arrays import Array, Ints
+from lpet_sim.recording.arrays import Ints
 from lpet_sim.recording.calibration import Calibration
 from lpet_sim.recording.recording import Manifest, Recording
 from lpet_sim.recording.streams import (
@@ -33,8 +34,6 @@ from lpet_sim.recording.streams import (
     WheelStream,
 )
 from lpet_sim.recording.truth import BodyTruth, Event, Truth, WheelTruth
-
-GRAVITY_MPS2 = 9.81
 
 
 def import_mcap(
@@ -60,27 +59,68 @@ def import_mcap(
     stated = _noted(bag.path, note) or stated_calibration(bag, where, declared)
     calibration = overridden(stated, declared)
     rows = gather(bag, _readers(where, calibration), progress)
-    images = paired_stamps(bag, where.left_image, where.right_image)
-    body = _body(rows.get(where.truth))
-    imu, wheels = _imu(rows.get(where.imu)), _wheels(rows.get(where.joints))
-    start = int(note["start_stamp_ns"]) if note else _start(bag.path, images, imu, wheels, body)
+    held = _Held(
+        paired_stamps(bag, where.left_image, where.right_image),
+        _imu(rows.get(where.imu)),
+        _wheels(rows.get(where.joints)),
+        _body(rows.get(where.truth)),
+    )
+    start = int(note["start_stamp_ns"]) if note else held.start(bag.path)
     if not note and (declared is None or "T_world_body_start" not in declared.model_fields_set):
-        placed = {"T_world_body_start": pose_at(body, start)}
+        placed = {"T_world_body_start": pose_at(held.body, start)}
         calibration = calibration.model_copy(update=placed)
-    layouts = json.loads(note.get("layouts", "{}"))
+    own = _Own(rows, json.loads(note.get("layouts", "{}")), start)
     measurements = Measurements(
         calibration,
-        imu=None if imu is None else counted_from(imu, start),
-        wheels=None if wheels is None else counted_from(wheels, start),
+        imu=None if held.imu is None else counted_from(held.imu, start),
+        wheels=None if held.wheels is None else counted_from(held.wheels, start),
         sightings=_sightings(rows.get(names.OWN_SIGHTINGS), start),
-        images=None if images is None else BagImages(bag, where, images, start),
-        odometry=_own(OdometryStream, names.OWN_ODOMETRY, rows, layouts, start),
+        images=None if held.images is None else BagImages(bag, where, held.images, start),
+        odometry=own.stream(OdometryStream, names.OWN_ODOMETRY),
     )
-    if body is None:
-        return Recording(_manifest(bag.path, note), measurements)
-    wheel_truth = _own(WheelTruth, names.OWN_WHEEL_TRUTH, rows, layouts, start)
-    truth = Truth(counted_from(body, start), wheel_truth, _events(bag))
+    wheel_truth = own.stream(WheelTruth, names.OWN_WHEEL_TRUTH)
+    truth = None
+    if held.body is not None:
+        truth = Truth(counted_from(held.body, start), wheel_truth, _events(bag))
     return Recording(_manifest(bag.path, note), measurements, truth)
+
+
+@dataclass(frozen=True)
+class _Stamps:
+    """Stamps alone, as a stream."""
+
+    t_ns: Ints
+
+
+@dataclass(frozen=True)
+class _Held:
+    """What a bag holds that others write too, with its own stamps."""
+
+    images: Ints | None
+    imu: ImuStream | None
+    wheels: WheelStream | None
+    body: BodyTruth | None
+
+    def start(self, path: Path) -> int:
+        """Find where a bag of others begins."""
+        images = None if self.images is None else _Stamps(self.images)
+        return first_stamp(path, (images, self.imu, self.wheels), self.body)
+
+
+@dataclass(frozen=True)
+class _Own:
+    """The rows of our own topics."""
+
+    rows: dict[str, Gathered]
+    layouts: dict[str, Any]
+    start_ns: int
+
+    def stream(self, kind: type[Struct], topic: str) -> Struct | None:
+        """Make a stream of a topic, None where there is none."""
+        if topic not in self.rows or topic not in self.layouts:
+            return None
+        found, layout = self.rows[topic], Layout.from_json(self.layouts[topic])
+        return unpack(kind, found.t_ns() - self.start_ns, layout, found.table())
 
 
 def _check(bag: Bag, where: names.TopicsSpec) -> None:
@@ -100,26 +140,6 @@ def _noted(path: Path, note: dict[str, str]) -> Calibration | None:
 
 def _manifest(path: Path, note: dict[str, str]) -> Manifest:
     return Manifest(**json.loads(note["manifest"])) if note else Manifest(f"mcap {path.stem}")
-
-
-def _start(
-    path: Path,
-    images: Ints | None,
-    imu: ImuStream | None,
-    wheels: WheelStream | None,
-    body: BodyTruth | None,
-) -> int:
-    """Find where a bag of others begins."""
-    if images is None:
-        return first_stamp(path, (imu, wheels), body)
-    shown = SightingStream(
-        images, np.zeros(len(images) + 1, np.int64), np.zeros(0, np.int64), *_nothing()
-    )
-    return first_stamp(path, (shown,), body)
-
-
-def _nothing() -> tuple[Array, Array]:
-    return np.zeros((0, 3)), np.zeros(0)
 
 
 def _readers(
@@ -214,15 +234,6 @@ def _sightings(rows: Gathered | None, start: int) -> SightingStream | None:
         table[:, 4].copy(),
         np.array([image[0] for image in images]),
     )
-
-
-def _own(
-    kind: type[Struct], topic: str, rows: dict[str, Gathered], layouts: dict[str, Any], start: int
-) -> Struct | None:
-    if topic not in rows or topic not in layouts:
-        return None
-    found = rows[topic]
-    return unpack(kind, found.t_ns() - start, Layout.from_json(layouts[topic]), found.table())
 
 
 def _events(bag: Bag) -> tuple[Event, ...]:
