@@ -134,7 +134,8 @@ def export_tum(run: RecordingIn, out: FolderOut) -> None:
     from lpet_sim.formats.tum import export_tum as write
     from lpet_sim.recording.reader import read_estimates
 
-    write(_read(run), read_estimates(run), out)
+    with bar(f"exporting {run.name}") as progress:
+        write(_read(run), read_estimates(run), out, progress)
     wrote(*sorted(out.iterdir()))
 
 

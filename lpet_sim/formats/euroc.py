@@ -17,6 +17,7 @@ from lpet_sim.formats import asl
 from lpet_sim.formats.clock import EPOCH_NS
 from lpet_sim.formats.csv_files import write_csv, write_names, write_stream
 from lpet_sim.formats.kalibr import write_kalibr
+from lpet_sim.formats.rows import each_row
 from lpet_sim.formats.sensor_yaml import camera_mappings, imu_mapping, pose_mapping, write_yaml
 from lpet_sim.geometry import SE3
 from lpet_sim.outputs import whole_folder
@@ -120,16 +121,10 @@ def _write_sightings(sightings: SightingStream, folder: Path) -> None:
     stamps = sightings.t_ns + EPOCH_NS
     write_csv(folder / asl.SIGHTED_IMAGES, asl.IMAGE_COLUMNS, stamps, sightings.drift_px[:, None])
     each = np.repeat(stamps, np.diff(sightings.offsets))
-    parts = zip(
-        each.tolist(),
-        sightings.landmark_id.tolist(),
-        sightings.stereo_px.tolist(),
-        sightings.sigma_px.tolist(),
-        strict=True,
-    )
+    rows = each_row(each, sightings.landmark_id, sightings.stereo_px, sightings.sigma_px)
     with (folder / asl.DATA).open("w") as file:
         file.write(f"#{','.join(asl.SIGHTING_COLUMNS)}\n")
-        for t, landmark, (u_left, u_right, v), sigma in parts:
+        for t, landmark, (u_left, u_right, v), sigma in rows:
             file.write(f"{t},{landmark},{u_left!r},{u_right!r},{v!r},{sigma!r}\n")
 
 

@@ -17,7 +17,7 @@ from lpet_sim.formats import ros_messages as ros
 from lpet_sim.formats import ros_types, topics
 from lpet_sim.formats.clock import EPOCH_NS
 from lpet_sim.formats.mcap_file import BagWriter, Span
-from lpet_sim.formats.rows import Layout, pack
+from lpet_sim.formats.rows import Layout, each_row, pack
 from lpet_sim.geometry import SE3
 from lpet_sim.outputs import whole_folder
 from lpet_sim.progress import Progress, silent, track
@@ -150,16 +150,15 @@ def _imu_messages(imu: ImuStream, declared: ImuCalibration | None) -> Iterator[M
     if declared is not None:
         walks = (declared.gyro_random_walk_radps_rthz, declared.accel_random_walk_mps2_rthz)
         variances = (walks[0] ** 2 * declared.rate_hz, walks[1] ** 2 * declared.rate_hz)
-    rows = zip(imu.t_ns.tolist(), imu.gyro_radps.tolist(), imu.accel_mps2.tolist(), strict=True)
-    for t_ns, gyro, accel in rows:
+    for t_ns, gyro, accel in each_row(imu.t_ns, imu.gyro_radps, imu.accel_mps2):
         fields = ros.inertial(_head(t_ns, topics.IMU_FRAME), gyro, accel, variances)
         yield Message(t_ns, NAMES.imu, ros_types.IMU, fields)
 
 
 def _joint_messages(wheels: WheelStream, names: tuple[str, ...]) -> Iterator[Message]:
     joints = topics.joint_names(names)
-    angles = np.concatenate([wheels.drive_angle_rad, wheels.steer_angle_rad], axis=1).tolist()
-    for t_ns, row in zip(wheels.t_ns.tolist(), angles, strict=True):
+    angles = np.concatenate([wheels.drive_angle_rad, wheels.steer_angle_rad], axis=1)
+    for t_ns, row in each_row(wheels.t_ns, angles):
         fields = ros.joints(_head(t_ns, NAMES.body_frame), joints, row)
         yield Message(t_ns, NAMES.joints, ros_types.JOINT_STATE, fields)
 
@@ -185,9 +184,9 @@ def _own_messages(topic: str, struct: ArrayStruct) -> Iterator[Message]:
 def _body_messages(body: BodyTruth) -> Iterator[Message]:
     poses = body.T_world_body
     v_body = np.einsum("nji,nj->ni", poses.rotation, body.v_world_body_mps)
-    twists = np.concatenate([v_body, body.omega_body_radps], axis=1).tolist()
-    parts = (body.t_ns.tolist(), poses.translation.tolist(), poses.quat_wxyz().tolist(), twists)
-    for t_ns, position, q_wxyz, twist in zip(*parts, strict=True):
+    twists = np.concatenate([v_body, body.omega_body_radps], axis=1)
+    parts = (body.t_ns, poses.translation, poses.quat_wxyz(), twists)
+    for t_ns, position, q_wxyz, twist in each_row(*parts):
         head = _head(t_ns, topics.WORLD)
         fields = ros.body_motion(head, NAMES.body_frame, (position, q_wxyz), twist)
         yield Message(t_ns, NAMES.truth, ros_types.ODOMETRY, fields)

@@ -18,6 +18,7 @@ from lpet_sim.formats.csv_files import read_csv, write_csv
 from lpet_sim.formats.euroc import export_euroc, write_measurements
 from lpet_sim.formats.euroc_read import import_euroc
 from lpet_sim.formats.rectify import Eye, RectifiedImages, rectified
+from lpet_sim.formats.sensor_yaml import imu_of
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.calibration import Calibration, PoseSpec
 from lpet_sim.recording.kitti import StereoFolder
@@ -262,3 +263,35 @@ def test_eyes_in_the_wrong_order_are_refused() -> None:
     left, right = eye((0, 0, 0), 0.0, BENT["equidistant"]), eye((0, 0, 0), 0.1, BENT["equidistant"])
     with pytest.raises(RecordingError, match="must stand to its right"):
         rectified(right, left)
+
+
+IMU_OF_OTHERS = """
+# Default settings of an inertial unit
+sensor_type: imu
+comment: a small one
+T_BS:
+  cols: 4
+  rows: 4
+  data: [1.0, 0.0, 0.0, 0.5,
+         0.0, 0.0, -1.0, 0.0,
+         0.0, 1.0, 0.0, 0.0,
+         0.0, 0.0, 0.0, 1.0]
+rate_hz: 200
+gyroscope_noise_density: 1.5e-04     # [ rad / s / sqrt(Hz) ]
+gyroscope_random_walk: 2e-05         # [ rad / s^2 / sqrt(Hz) ]
+accelerometer_noise_density: 2e-3
+accelerometer_random_walk: 3.0000e-3
+"""
+
+
+def test_an_inertial_unit_of_others_is_read_with_its_units(tmp_path: Path) -> None:
+    """Numbers that YAML takes for words, such as 2e-3, are numbers here."""
+    path = tmp_path / "sensor.yaml"
+    path.write_text(IMU_OF_OTHERS)
+    read = imu_of(path)
+    assert (read.rate_hz, read.gyro_random_walk_radps_rthz) == (200.0, 1.5e-4)
+    assert read.accel_random_walk_mps2_rthz == 2e-3
+    np.testing.assert_allclose(read.T_body_imu.se3() @ np.array([0, 0, 1.0]), [0.5, -1.0, 0.0])
+    path.write_text(IMU_OF_OTHERS.replace("rate_hz: 200", ""))
+    with pytest.raises(RecordingError, match="'rate_hz' must be a number"):
+        imu_of(path)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from estimators import build_estimator
 from lpet_sim.datasets import DataError, data_path
@@ -157,3 +158,22 @@ def test_other_commands_see_what_was_imported(lpet: Lpet, recorded: Path, tmp_pa
     assert lpet("export", "tum", back, tmp_path / "tum").code == 0
     rows = np.loadtxt(tmp_path / "tum" / "dead_reckoning.txt")
     assert len(rows) > 10
+
+
+def test_an_import_that_breaks_off_leaves_no_recording(
+    lpet: Lpet, recorded: Path, tmp_path: Path
+) -> None:
+    """An image in the middle that is none, or in colour, is named."""
+    assert lpet("export", "euroc", recorded, tmp_path / "out").code == 0
+    image = sorted((tmp_path / "out/mav0/cam1/data").glob("*.png"))[4]
+    for spoil in (lambda: image.write_text("no image"), lambda: _colour().save(image)):
+        spoil()
+        ended = lpet("import", "euroc", tmp_path / "out", tmp_path / "back.rrd")
+        assert ended.code == 2
+        assert str(image) in ended.err
+        assert "a grey PNG" in ended.err
+        assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def _colour() -> Image.Image:
+    return Image.new("RGB", (64, 48))

@@ -164,6 +164,30 @@ def test_the_memory_of_an_export_does_not_grow_with_its_images(name: str, tmp_pa
     assert peaks[2] - peaks[1] < 0.1 * added
 
 
+IMPORTS: dict[str, Callable[[Path], Recording]] = {name: row[1] for name, row in FORMATS.items()}
+IMPORTS["kitti"] = import_kitti
+
+
+@pytest.mark.parametrize("name", IMPORTS)
+def test_the_memory_of_an_import_does_not_grow_with_its_images(name: str, tmp_path: Path) -> None:
+    """As for the export, with every pair read once, the way it goes into a recording."""
+    peaks = []
+    for count in (16, 16, 40):
+        given, folder = small(), tmp_path / f"{count}_{len(peaks)}"
+        calibration = given.measurements.calibration
+        made = Recording(given.manifest, Measurements(calibration, images=_Made(count)))
+        EXPORTS[name](made, folder, silent)
+        tracemalloc.start()
+        images = IMPORTS[name](folder).measurements.images
+        assert images is not None
+        sums = [int(eye.sum()) for k in range(count) for eye in images.pair(k)]
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert len(set(sums)) > 1
+    added = (40 - 16) * 2 * _Made.SIDE**2
+    assert peaks[2] - peaks[1] < 0.1 * added
+
+
 class _Made:
     """Image pairs of noise, made when they are asked for."""
 
