@@ -14,26 +14,8 @@ ROUNDING = 4e-15
 
 
 def small(bits: int = 8) -> Recording:
-    """Make four seconds with every stream; 12-bit images are as a rover's camera gives them."""
-    made = synthetic.recording(4.0, seed=3, bits=bits)
-    if bits == 8:
-        return made
-    images = made.measurements.images
-    assert images is not None
-    fitting = synthetic.ImagesInMemory(
-        images.t_ns,
-        np.stack([images.pair(k)[0] >> (16 - bits) for k in range(len(images))]),
-        np.stack([images.pair(k)[1] >> (16 - bits) for k in range(len(images))]),
-    )
-    return Recording(
-        made.manifest,
-        synthetic.Measurements(
-            **{name: getattr(made.measurements, name) for name in STREAMS},
-            calibration=made.measurements.calibration,
-            images=fitting,
-        ),
-        made.truth,
-    )
+    """Make four seconds with every stream, with images of so many bits."""
+    return synthetic.recording(4.0, seed=3, bits=bits)
 
 
 def assert_same_images(read: StereoImages | None, given: StereoImages | None) -> None:
