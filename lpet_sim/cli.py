@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 
 from lpet_sim.cli_estimator import check_estimator
+from lpet_sim.cli_formats import export_app, import_app
 from lpet_sim.cli_reach import reach
 from lpet_sim.cli_report import report
 from lpet_sim.cli_rig import rig_app
@@ -28,10 +29,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # Rich would take units in brackets for its own marks.
 )
-import_app = typer.Typer(
-    help="Make a recording of a real data set.", no_args_is_help=True, rich_markup_mode=None
-)
 app.add_typer(import_app, name="import")
+app.add_typer(export_app, name="export")
 app.add_typer(rig_app, name="rig")
 app.command()(reach)
 app.command()(study)
@@ -193,31 +192,6 @@ def terrain(
     summary, paths = draw_terrain(spec, seed, size, out)
     print_tables(terrain_tables(summary))
     wrote(*paths)
-
-
-@import_app.command("kitti")
-def import_kitti(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the sequence.")],
-    out: Annotated[Path, typer.Argument(metavar="OUT.rrd", help="The recording to write.")],
-) -> None:
-    """Import a KITTI odometry sequence."""
-    from lpet_sim.sweep.importing import import_kitti as run
-
-    with bar(f"importing {folder.name}") as progress:
-        run(folder, out, progress)
-    wrote(out)
-
-
-@import_app.command("starry-night")
-def import_starry_night(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of its MATLAB file.")],
-    out: Annotated[Path, typer.Argument(metavar="OUT.rrd", help="The recording to write.")],
-) -> None:
-    """Import the Starry Night data set: stereo sightings, gyro and velocity."""
-    from lpet_sim.sweep.importing import import_starry_night as run
-
-    run(folder, out)
-    wrote(out)
 
 
 @app.command()

@@ -55,12 +55,20 @@ MAY_IMPORT["cli_rig"] = {*MAY_IMPORT} - {"study"}
 MAY_IMPORT["cli_report"] = {*MAY_IMPORT} - {"study", "cli_rig"}
 MAY_IMPORT["cli_estimator"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report"}
 MAY_IMPORT["cli_sweep"] = {*MAY_IMPORT} - {"study", "cli_rig"}
-MAY_IMPORT["cli_reach"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report", "cli_sweep"}
-MAY_IMPORT["cli_tradeoff"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report", "cli_sweep"}
+MAY_IMPORT["cli_formats"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report", "cli_sweep"}
+MAY_IMPORT["cli_reach"] = {*MAY_IMPORT} - {
+    "study",
+    "cli_rig",
+    "cli_report",
+    "cli_sweep",
+    "cli_formats",
+}
+MAY_IMPORT["cli_tradeoff"] = MAY_IMPORT["cli_reach"]
 MAY_IMPORT["cli_study"] = {*MAY_IMPORT} - {
     "cli_rig",
     "cli_report",
     "cli_sweep",
+    "cli_formats",
     "cli_reach",
     "cli_tradeoff",
 }
@@ -85,9 +93,12 @@ QUARANTINE: dict[str, set[str]] = {
     "gtsam": {"estimators/peers/library.py"},
     "distributed": {"lpet_sim/sweep/sweep_pool.py"},
     "joblib": {"lpet_sim/sweep/sweep_pool.py"},
+    "mcap": {"lpet_sim/formats/mcap_file.py"},
+    "mcap_ros2": {"lpet_sim/formats/mcap_file.py"},
     "typer": {
         "lpet_sim/cli.py",
         "lpet_sim/cli_estimator.py",
+        "lpet_sim/cli_formats.py",
         "lpet_sim/cli_reach.py",
         "lpet_sim/cli_report.py",
         "lpet_sim/cli_rig.py",

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
 from lpet_sim.errors import RecordingError
-from lpet_sim.formats.rows import Layout, pack, unpack
+from lpet_sim.formats.rows import Layout, each_row, pack, unpack
 from lpet_sim.recording.arrays import Array, ArrayStruct, Ints
 
 Struct = TypeVar("Struct", bound=ArrayStruct)
-_LAYOUT = "#lpet "
+_OWN = "lpet "
+_LAYOUT = f"#{_OWN}"
 
 
 def write_csv(path: Path, header: Sequence[str], stamps: Ints, values: Array) -> None:
@@ -26,8 +28,7 @@ def write_csv(path: Path, header: Sequence[str], stamps: Ints, values: Array) ->
         stamps: Stamps [ns], Shape (n,).
         values: Shape (n, k).
     """
-    rows = zip(stamps.tolist(), values.tolist(), strict=True)
-    _write_lines(path, header, (f"{t},{','.join(map(repr, row))}" for t, row in rows))
+    _write_lines(path, [",".join(header)], _texts(stamps, values))
 
 
 def read_csv(path: Path, columns: int) -> tuple[Ints, Array]:
@@ -36,24 +37,20 @@ def read_csv(path: Path, columns: int) -> tuple[Ints, Array]:
     Raises:
         RecordingError: The file is missing, or a row has too few numbers or no numbers.
     """
-    stamps: list[int] = []
-    values: list[list[float]] = []
+    stamps, values = array("q"), array("d")
     for number, line in enumerate(_lines(path), start=1):
         if not line.startswith("#") and line.strip():
             stamp, row = _row(path, number, line, columns)
             stamps.append(stamp)
-            values.append(row)
-    array = np.array(values, dtype=float).reshape(-1, columns)
-    return np.array(stamps, dtype=np.int64), array
+            values.extend(row)
+    return np.array(stamps, dtype=np.int64), np.array(values).reshape(-1, columns)
 
 
 def write_stream(path: Path, epoch_ns: int, struct: ArrayStruct) -> None:
     """Write a stream that has no format of others, with its layout in a second line."""
     layout, rows = pack(struct)
-    lines = [f"#timestamp [ns],{','.join(layout.labels())}", _LAYOUT + json.dumps(layout.json())]
-    pairs = zip((struct.t_ns + epoch_ns).tolist(), rows.tolist(), strict=True)
-    lines.extend(f"{t},{','.join(map(repr, row))}" for t, row in pairs)
-    path.write_text("\n".join(lines) + "\n")
+    header = [f"timestamp [ns],{','.join(layout.labels())}", _OWN + json.dumps(layout.json())]
+    _write_lines(path, header, _texts(struct.t_ns + epoch_ns, rows))
 
 
 def read_stream(path: Path, epoch_ns: int, kind: type[Struct]) -> Struct:
@@ -76,7 +73,7 @@ def read_stream(path: Path, epoch_ns: int, kind: type[Struct]) -> Struct:
 def write_names(path: Path, header: Sequence[str], stamps: Ints, names: Sequence[str]) -> None:
     """Write a stamp and a file's name in each row."""
     rows = zip(stamps.tolist(), names, strict=True)
-    _write_lines(path, header, (f"{t},{name}" for t, name in rows))
+    _write_lines(path, [",".join(header)], (f"{t},{name}" for t, name in rows))
 
 
 def read_names(path: Path) -> dict[int, str]:
@@ -96,9 +93,13 @@ def read_names(path: Path) -> dict[int, str]:
     return found
 
 
+def _texts(stamps: Ints, values: Array) -> Iterator[str]:
+    return (f"{t},{','.join(map(repr, row))}" for t, row in each_row(stamps, values))
+
+
 def _write_lines(path: Path, header: Sequence[str], rows: Iterable[str]) -> None:
     with path.open("w") as file:
-        file.write(f"#{','.join(header)}\n")
+        file.writelines(f"#{line}\n" for line in header)
         file.writelines(f"{row}\n" for row in rows)
 
 

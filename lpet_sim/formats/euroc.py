@@ -17,6 +17,7 @@ from lpet_sim.formats import asl
 from lpet_sim.formats.clock import EPOCH_NS
 from lpet_sim.formats.csv_files import write_csv, write_names, write_stream
 from lpet_sim.formats.kalibr import write_kalibr
+from lpet_sim.formats.rows import each_row
 from lpet_sim.formats.sensor_yaml import camera_mappings, imu_mapping, pose_mapping, write_yaml
 from lpet_sim.geometry import SE3
 from lpet_sim.outputs import whole_folder
@@ -28,6 +29,9 @@ from lpet_sim.recording.recording import Manifest, Recording
 from lpet_sim.recording.streams import ImuStream, Measurements, SightingStream, StereoImages
 from lpet_sim.recording.truth import BodyTruth, Truth
 
+_TABLES = 0.3
+"""Share of the work that tables are, about, where there are images."""
+
 
 def export_euroc(recording: Recording, folder: Path, progress: Progress = silent) -> None:
     """Write a recording as an ASL folder, images one pair at a time.
@@ -35,16 +39,17 @@ def export_euroc(recording: Recording, folder: Path, progress: Progress = silent
     Args:
         recording: What to write.
         folder: A folder that is made; ``mav0`` and Kalibr's files lie in it.
-        progress: Called after each pair.
+        progress: Called after the tables, then after each pair.
 
     Raises:
         OutputError: The folder is there already, or cannot be written.
     """
     with whole_folder(folder) as out:
-        write_measurements(recording.measurements, out, progress)
         write_kalibr(recording.measurements.calibration, out)
         if recording.truth is not None:
             _write_truth(recording.truth, recording.manifest, out / asl.ROOT)
+            progress(_TABLES / 2)
+        write_measurements(recording.measurements, out, progress)
 
 
 def write_measurements(
@@ -55,7 +60,7 @@ def write_measurements(
     Args:
         measurements: What to write.
         folder: A folder that exists; ``mav0`` is made in it.
-        progress: Called after each image pair.
+        progress: Called after the tables, then after each image pair.
 
     Raises:
         RecordingError: There are images, but no stereo camera is declared.
@@ -63,7 +68,7 @@ def write_measurements(
     if measurements.images is not None and measurements.calibration.stereo is None:
         raise RecordingError("the recording has images but declares no stereo camera")
     root = folder / asl.ROOT
-    root.mkdir()
+    root.mkdir(exist_ok=True)
     declared = measurements.calibration
     write_yaml(root / asl.ABOUT, asl.AboutSpec.of(declared, EPOCH_NS).to_mapping())
     if declared.stereo is not None:
@@ -73,8 +78,11 @@ def write_measurements(
     if declared.wheels is not None:
         write_yaml(_made(root / asl.WHEELS) / asl.SENSOR, asl.wheel_mapping(declared.wheels))
     _write_streams(measurements, root)
+    progress(_TABLES)
     if measurements.images is not None:
-        _write_images(measurements.images, root, progress)
+        rest = 1.0 - _TABLES
+        _write_images(measurements.images, root, lambda done: progress(_TABLES + rest * done))
+    progress(1.0)
 
 
 def _write_streams(measurements: Measurements, root: Path) -> None:
@@ -113,16 +121,10 @@ def _write_sightings(sightings: SightingStream, folder: Path) -> None:
     stamps = sightings.t_ns + EPOCH_NS
     write_csv(folder / asl.SIGHTED_IMAGES, asl.IMAGE_COLUMNS, stamps, sightings.drift_px[:, None])
     each = np.repeat(stamps, np.diff(sightings.offsets))
-    parts = zip(
-        each.tolist(),
-        sightings.landmark_id.tolist(),
-        sightings.stereo_px.tolist(),
-        sightings.sigma_px.tolist(),
-        strict=True,
-    )
+    rows = each_row(each, sightings.landmark_id, sightings.stereo_px, sightings.sigma_px)
     with (folder / asl.DATA).open("w") as file:
         file.write(f"#{','.join(asl.SIGHTING_COLUMNS)}\n")
-        for t, landmark, (u_left, u_right, v), sigma in parts:
+        for t, landmark, (u_left, u_right, v), sigma in rows:
             file.write(f"{t},{landmark},{u_left!r},{u_right!r},{v!r},{sigma!r}\n")
 
 

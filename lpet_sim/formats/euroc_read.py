@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,6 +12,7 @@ import numpy as np
 from lpet_sim.errors import RecordingError, SpecError
 from lpet_sim.formats import asl
 from lpet_sim.formats.asl_cameras import from_stamp, read_cameras
+from lpet_sim.formats.beginning import counted_from, first_stamp, pose_at
 from lpet_sim.formats.csv_files import read_csv, read_stream
 from lpet_sim.formats.overrides import overridden
 from lpet_sim.formats.sensor_yaml import imu_of, own_part, read_mapping
@@ -19,7 +20,6 @@ from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import ArrayStruct, Ints
 from lpet_sim.recording.calibration import (
     Calibration,
-    PoseSpec,
     StereoCalibration,
     WheelCalibration,
 )
@@ -32,7 +32,6 @@ from lpet_sim.recording.streams import (
     StereoImages,
     WheelStream,
 )
-from lpet_sim.recording.trajectory import Trajectory
 from lpet_sim.recording.truth import BodyTruth, Event, Truth, WheelTruth
 
 GRAVITY_MPS2 = 9.81
@@ -96,7 +95,7 @@ def _own(root: Path, held: _Held, declared: Calibration | None) -> Recording:
     )
     measurements = Measurements(
         overridden(stated, declared),
-        imu=None if held.imu is None else _counted_from(held.imu, start),
+        imu=None if held.imu is None else counted_from(held.imu, start),
         wheels=_stream(root / asl.WHEELS, start, WheelStream),
         sightings=_sightings(root / asl.SIGHTINGS, start),
         images=None if held.images is None else from_stamp(held.images, start),
@@ -107,46 +106,21 @@ def _own(root: Path, held: _Held, declared: Calibration | None) -> Recording:
 
 def _foreign(root: Path, held: _Held, declared: Calibration | None) -> Recording:
     """Begin with the first image, or reading, of which the truth tells the pose."""
-    start = _first_stamp(root, held)
+    start = first_stamp(root, (held.images, held.imu), held.body)
     stated = Calibration(
         stereo=held.stereo,
         imu=None if held.imu is None else imu_of(root / asl.IMU / asl.SENSOR),
-        T_world_body_start=_pose_at(held.body, start),
+        T_world_body_start=pose_at(held.body, start),
         gravity_mps2=GRAVITY_MPS2,
     )
     measurements = Measurements(
         overridden(stated, declared),
-        imu=None if held.imu is None else _counted_from(held.imu, start),
+        imu=None if held.imu is None else counted_from(held.imu, start),
         images=None if held.images is None else from_stamp(held.images, start),
     )
-    truth = None if held.body is None else Truth(_counted_from(held.body, start))
+    truth = None if held.body is None else Truth(counted_from(held.body, start))
     name = root.parent.name if root.name == asl.ROOT else root.name
     return Recording(Manifest(f"euroc {name}"), measurements, truth)
-
-
-def _first_stamp(root: Path, held: _Held) -> int:
-    for stream in (held.images, held.imu, held.body):
-        if stream is not None:
-            begin = -1 if held.body is None else int(held.body.t_ns[0])
-            after = stream.t_ns[stream.t_ns >= begin]
-            if not len(after):
-                raise RecordingError(f"{root}: all measurements lie before the truth begins")
-            return int(after[0])
-    raise RecordingError(f"{root} holds neither images nor readings nor a truth")
-
-
-def _pose_at(body: BodyTruth | None, stamp: int) -> PoseSpec:
-    if body is None:
-        return PoseSpec()
-    return PoseSpec.from_se3(Trajectory(body.t_ns, body.T_world_body).at([stamp])[0])
-
-
-def _counted_from(stream: Struct, start: int) -> Struct:
-    """Leave out the rows before a stamp, and count from it."""
-    rows = stream.t_ns >= start
-    changed: dict[str, Any] = {f.name: getattr(stream, f.name)[rows] for f in fields(stream)}  # type: ignore[arg-type]
-    changed["t_ns"] = stream.t_ns[rows] - start
-    return replace(stream, **changed)  # type: ignore[type-var]
 
 
 def _imu(root: Path) -> ImuStream | None:
@@ -210,7 +184,7 @@ def _own_truth(root: Path, body: BodyTruth | None, start: int) -> Truth | None:
     if body is None:
         return None
     folder = root / asl.OWN_TRUTH
-    counted = _counted_from(body, start)
+    counted = counted_from(body, start)
     if (folder / asl.BODY_RATE).exists():
         _, rate = read_csv(folder / asl.BODY_RATE, 3)
         counted = replace(counted, omega_body_radps=rate)

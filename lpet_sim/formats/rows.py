@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Self, TypeVar
 
@@ -13,6 +13,7 @@ from lpet_sim.recording.arrays import Array, ArrayStruct, Ints
 from lpet_sim.recording.columns import Column, put_together, take_apart
 
 Struct = TypeVar("Struct", bound=ArrayStruct)
+_ROWS_AT_ONCE = 4096
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,13 @@ class Layout:
         """Name every number of a row."""
         pairs = zip(self.names, self.sizes(), strict=True)
         return [f"{name}_{k}" if size > 1 else name for name, size in pairs for k in range(size)]
+
+
+def each_row(*arrays: NDArray[Any]) -> Iterator[tuple[Any, ...]]:
+    """Give the rows of arrays of equal length as plain values, few of them in memory at once."""
+    for start in range(0, len(arrays[0]), _ROWS_AT_ONCE):
+        pieces = (array[start : start + _ROWS_AT_ONCE].tolist() for array in arrays)
+        yield from zip(*pieces, strict=True)
 
 
 def pack(struct: ArrayStruct) -> tuple[Layout, Array]:

@@ -137,7 +137,8 @@ def numbers_of(path: Path, mapping: Mapping[str, Any], key: str, count: int) -> 
     """
     found = _numbers(mapping.get(key, []))
     if found.shape != (count,) or not np.all(np.isfinite(found)):
-        raise RecordingError(f"{path}: '{key}' must hold {count} numbers")
+        wanted = "a number" if count == 1 else f"{count} numbers"
+        raise RecordingError(f"{path}: '{key}' must be {wanted}")
     return found
 
 

@@ -14,8 +14,10 @@ import numpy as np
 
 from lpet_sim.errors import RecordingError
 from lpet_sim.formats.clock import EPOCH_NS, seconds_text, stamp_of_text
+from lpet_sim.formats.rows import each_row
 from lpet_sim.geometry import SE3
 from lpet_sim.outputs import whole_folder
+from lpet_sim.progress import Progress, silent, track
 from lpet_sim.recording import layout
 from lpet_sim.recording.calibration import Calibration, PoseSpec
 from lpet_sim.recording.estimate import Estimate
@@ -30,13 +32,19 @@ _WXYZ_TO_XYZW = [1, 2, 3, 0]
 _XYZW_TO_WXYZ = [3, 0, 1, 2]
 
 
-def export_tum(recording: Recording, estimates: Mapping[str, Estimate], folder: Path) -> None:
+def export_tum(
+    recording: Recording,
+    estimates: Mapping[str, Estimate],
+    folder: Path,
+    progress: Progress = silent,
+) -> None:
     """Write the truth and every estimate of a recording, one file for each.
 
     Args:
         recording: Whose truth is written, as ``truth.txt``.
         estimates: Estimates by name; the name is the file's.
         folder: A folder that is made.
+        progress: Called after each file.
 
     Raises:
         RecordingError: There is neither truth nor an estimate.
@@ -50,7 +58,7 @@ def export_tum(recording: Recording, estimates: Mapping[str, Estimate], folder: 
             "the recording has no truth and no estimate; run 'lpet estimate' before this export"
         )
     with whole_folder(folder) as out:
-        for name, trajectory in held.items():
+        for name, trajectory in track(held.items(), len(held), progress):
             write_tum(out / f"{name}.txt", trajectory)
 
 
@@ -64,12 +72,11 @@ def write_tum(path: Path, trajectory: Trajectory, epoch_ns: int = EPOCH_NS) -> N
     """
     poses = trajectory.T_world_body
     quaternion = poses.quat_wxyz()[:, _WXYZ_TO_XYZW]
-    rows = np.concatenate([poses.translation, quaternion], axis=1).tolist()
-    stamps = (trajectory.t_ns + epoch_ns).tolist()
+    rows = np.concatenate([poses.translation, quaternion], axis=1)
     with path.open("w") as file:
         file.write("# timestamp[s] x[m] y[m] z[m] qx qy qz qw\n")
         file.write(f"# lpet_start_s={seconds_text(epoch_ns)}\n")
-        for stamp, row in zip(stamps, rows, strict=True):
+        for stamp, row in each_row(trajectory.t_ns + epoch_ns, rows):
             file.write(f"{seconds_text(stamp)} {' '.join(map(repr, row))}\n")
 
 
