@@ -58,6 +58,10 @@ MAY_IMPORT["cli"] = {*MAY_IMPORT}
 QUARANTINE: dict[str, set[str]] = {
     "mujoco": {
         "lpet_sim/rover/mjcf.py",
+        "lpet_sim/rover/model_fit.py",
+        "lpet_sim/rover/model_parts.py",
+        "lpet_sim/rover/model_source.py",
+        "lpet_sim/rover/picture.py",
         "lpet_sim/rover/scene.py",
         "lpet_sim/sensors/render_scene.py",
     },
