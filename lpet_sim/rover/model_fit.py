@@ -52,7 +52,9 @@ def fitted(spec: RoverModelSpec) -> mujoco.MjSpec:
     canvas = _canvas(spec)
     body = canvas.worldbody.add_body(name="body")
     body.add_freejoint(name="body")
-    frame = body.add_frame(**_place(parts.T_body_root))
+    # Where the root stands in the user's own world says nothing.
+    T_world_root = SE3.from_quat_wxyz(model.body_quat[1], model.body_pos[1])
+    frame = body.add_frame(**_place(parts.T_body_root @ T_world_root.inverse()))
     canvas.attach(source, prefix=OWN, frame=frame)
     _add_wheels(canvas, parts, spec, _share(model, parts, spec))
     _add_sites(canvas, parts, spec)
