@@ -45,12 +45,14 @@ MAY_IMPORT["cli_report"] = {*MAY_IMPORT} - {"study", "cli_rig"}
 MAY_IMPORT["cli_sweep"] = {*MAY_IMPORT} - {"study", "cli_rig"}
 MAY_IMPORT["cli_reach"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report", "cli_sweep"}
 MAY_IMPORT["cli_tradeoff"] = {*MAY_IMPORT} - {"study", "cli_rig", "cli_report", "cli_sweep"}
+MAY_IMPORT["cli_rover"] = {*MAY_IMPORT["cli_tradeoff"]}
 MAY_IMPORT["cli_study"] = {*MAY_IMPORT} - {
     "cli_rig",
     "cli_report",
     "cli_sweep",
     "cli_reach",
     "cli_tradeoff",
+    "cli_rover",
 }
 MAY_IMPORT["cli"] = {*MAY_IMPORT}
 """Which rooms each room may import, besides itself."""
@@ -82,6 +84,7 @@ QUARANTINE: dict[str, set[str]] = {
         "lpet_sim/cli_reach.py",
         "lpet_sim/cli_report.py",
         "lpet_sim/cli_rig.py",
+        "lpet_sim/cli_rover.py",
         "lpet_sim/cli_study.py",
         "lpet_sim/cli_sweep.py",
         "lpet_sim/cli_tradeoff.py",

@@ -20,6 +20,7 @@ from lpet_sim.rover.shapes import LinkMesh, drawn_shape
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.rover.wheel_parts import wheel_parts
 
+
 @dataclass(frozen=True)
 class Link:
     """A rigid part of the rover.

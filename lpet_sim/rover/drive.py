@@ -12,12 +12,13 @@ import numpy as np
 from lpet_sim.errors import PlanningError, SpecError
 from lpet_sim.recording.arrays import NS_PER_S
 from lpet_sim.recording.truth import Event, Truth, in_order
+from lpet_sim.rover.drivable import check_drivable, reach_of
 from lpet_sim.rover.episodes import Watch
 from lpet_sim.rover.faults import Faults
 from lpet_sim.rover.follower import Follower
 from lpet_sim.rover.hazards import ends_drive, hazards_of
 from lpet_sim.rover.observer import Observer, Tick
-from lpet_sim.rover.scene import Scene, check_drivable, reach_of
+from lpet_sim.rover.scene import Scene
 from lpet_sim.rover.spec import DriveSpec
 from lpet_sim.rover.truth_log import TruthLog
 

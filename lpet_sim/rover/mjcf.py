@@ -11,10 +11,10 @@ import mujoco
 import numpy as np
 
 from lpet_sim.errors import UnknownNameError
+from lpet_sim.rover.ground import CELL_M, RANGE_M, GroundPatch, RocksLike
 from lpet_sim.rover.model_fit import fitted
 from lpet_sim.rover.model_source import DRAWN_GROUP
 from lpet_sim.rover.model_spec import load_rover_model, wheel_names
-from lpet_sim.rover.ground import CELL_M, RANGE_M, GroundPatch, RocksLike
 
 _FLOOR_M = 1.0
 _NET_FORCE = 3  # the contact sensor's reduction of that name
@@ -59,6 +59,13 @@ def compile_on(name: str, dt_s: float, patch: GroundPatch, rocks: RocksLike) -> 
         patch: The ground.
         rocks: Convex rocks, each a geom of its own.
     """
+    model = spec_on(name, dt_s, patch, rocks).compile()
+    model.hfield_data[:] = patch.data.ravel()
+    return model
+
+
+def spec_on(name: str, dt_s: float, patch: GroundPatch, rocks: RocksLike) -> mujoco.MjSpec:
+    """Put a rover and ground together as `compile_on` does, not yet compiled, without heights."""
     spec = rover_source(name).copy()
     spec.option.timestep = dt_s
     _add_ground(spec, patch)
@@ -67,9 +74,7 @@ def compile_on(name: str, dt_s: float, patch: GroundPatch, rocks: RocksLike) -> 
     for wheel in wheel_names(name):
         _add_contact_sensor(spec, f"load_{wheel}", wheel, None)
         _add_contact_sensor(spec, f"soil_{wheel}", wheel, "ground")
-    model = spec.compile()
-    model.hfield_data[:] = patch.data.ravel()
-    return model
+    return spec
 
 
 def _add_contact_sensor(spec: mujoco.MjSpec, name: str, wheel: str, ground: str | None) -> None:

@@ -126,9 +126,7 @@ def _damp(source: mujoco.MjSpec, parts: Parts, spec: RoverModelSpec, share: _Sha
             joint.damping[0] = 2.2 * share.torque_nm if damping is None else damping
 
 
-def _add_wheels(
-    canvas: mujoco.MjSpec, parts: Parts, spec: RoverModelSpec, share: _Share
-) -> None:
+def _add_wheels(canvas: mujoco.MjSpec, parts: Parts, spec: RoverModelSpec, share: _Share) -> None:
     motors = spec.motors
     for wheel in parts.wheels:
         _add_tread(canvas.body(OWN + wheel.drive.link), wheel, parts)

@@ -24,7 +24,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 Name = Annotated[str, Field(min_length=1)]
 MARS_GRAVITY_MPS2 = 3.721
 MOST_STEER_RAD = 1.5
-"""A wheel that its model lets turn without end is steered no farther than this, just under 90 deg."""
+"""A wheel that its model lets steer without end is steered no farther than this: 86 deg."""
 
 
 class WheelPart(Spec):
@@ -200,7 +200,9 @@ class RoverModelSpec(Spec):
                 raise ValueError(f"two wheels have the {what} '{twice[0]}'; each needs its own")
         lacks = [wheel.name for wheel in self.wheels if wheel.drive is None]
         if lacks and not self.complete:
-            raise ValueError(f"wheel '{lacks[0]}' lacks drive: the name of the joint it rolls about")
+            raise ValueError(
+                f"wheel '{lacks[0]}' lacks drive: the name of the joint it rolls about"
+            )
         return self
 
     @property
@@ -230,8 +232,8 @@ def _description_path(name_or_path: str) -> Path:
     path = Path(name_or_path)
     if path.suffix in (".xml", ".urdf"):
         raise SpecError(
-            f"{path} is the model itself: give the YAML that names its wheels, as docs/own_rover.md "
-            "tells"
+            f"{path} is the model itself: give the YAML that names its wheels, which "
+            "docs/own_rover.md tells how to write"
         )
     if not path.exists() and path.suffix not in (".yaml", ".yml"):
         raise UnknownNameError("rover model", name_or_path, model_names())
@@ -286,4 +288,3 @@ def identity_of(name_or_path: str) -> dict[str, Any] | None:
 def limit_of(low_rad: float, high_rad: float) -> float:
     """Give how far a joint of this range steers both ways [rad]."""
     return min(-low_rad, high_rad, MOST_STEER_RAD) if low_rad < high_rad else MOST_STEER_RAD
-

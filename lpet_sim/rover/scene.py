@@ -12,10 +12,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from lpet_sim.errors import PlanningError
 from lpet_sim.geometry import SE3, so3
 from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.truth import CONTACT_NONE, CONTACT_ROCK, CONTACT_SOIL
+from lpet_sim.rover.drivable import check_drivable, reach_of
 from lpet_sim.rover.frames import RoverFrames, rover_frames
 from lpet_sim.rover.ground import Ground, cut_patch
 from lpet_sim.rover.mjcf import compile_on
@@ -24,7 +24,6 @@ from lpet_sim.rover.wheel_contact import WheelContact, WheelIndex, law_on
 from lpet_sim.rover.wheel_parts import WheelParts, parts_of
 from lpet_sim.rover.wheel_soil import WheelSoilLaw, WheelState
 
-_LEAST_REACH_M, _SPARE_M = 1.25, 0.15
 _ROCK_MARGIN_M = 1.0  # rocks are found by their centre; the largest reach this far
 _LIFT_STEP_M = 0.01
 # Sweeps that take creep out of contacts: to hold slip to half a point, and to park for hours.
@@ -288,34 +287,3 @@ def build_scene(
     scene = Scene(ground, spec, law or law_on(ground, spec))
     scene.place(np.asarray(start_xy_m, dtype=float), start_yaw_rad)
     return scene
-
-
-def reach_of(frames: RoverFrames) -> float:
-    """Give how far the wheels reach from the body's origin, with room to spare [m]."""
-    far = float(np.hypot(*frames.wheel_position_body_m[:, :2].T).max())
-    return max(_LEAST_REACH_M, far + frames.wheel_radius_m + _SPARE_M)
-
-
-def check_drivable(ground: Ground, xy: Array, reach_m: float) -> None:
-    """Hold points to lie on drivable ground, with the rover's reach to spare.
-
-    Args:
-        ground: The terrain.
-        xy: The points [m], Shape (n, 2).
-        reach_m: See `reach_of`.
-
-    Raises:
-        PlanningError: A point lies outside.
-    """
-    box = ground.drivable
-    if box is None:
-        return
-    low = np.array([box.x_min, box.y_min]) + reach_m
-    high = np.array([box.x_max, box.y_max]) - reach_m
-    outside = np.any((xy < low) | (xy > high), axis=1)
-    if outside.any():
-        x, y = xy[outside][0]
-        raise PlanningError(
-            f"({x:.1f}, {y:.1f}) m lies outside the drivable ground: x from {low[0]:.1f} to "
-            f"{high[0]:.1f}, y from {low[1]:.1f} to {high[1]:.1f} m"
-        )

@@ -66,9 +66,7 @@ class TruthLog:
         rows = np.array(self._wheels)
         before = rows[:1] if self._wheel_before is None else self._wheel_before[None]
         self._wheel_before = rows[-1]
-        slip, slip_angle = slip_between(
-            np.concatenate([before, rows]), self._radius_m, self._count
-        )
+        slip, slip_angle = slip_between(np.concatenate([before, rows]), self._radius_m, self._count)
         at = row_columns(self._count)
         return WheelTruth(
             t_ns=np.array(self._wheel_t_ns, dtype=np.int64),
@@ -89,7 +87,9 @@ def row_columns(wheels: int) -> dict[str, slice]:
     widths = {"drive": 1, "steer": 1, "load": 1, "contact": 1, "centre": 3, "leg": 4}
     widths |= {"traction": 1, "sinkage": 1}
     ends = np.cumsum([0, *widths.values()]) * wheels
-    found = {name: slice(int(a), int(b)) for name, a, b in zip(widths, ends, ends[1:], strict=False)}
+    found = {
+        name: slice(int(a), int(b)) for name, a, b in zip(widths, ends, ends[1:], strict=False)
+    }
     return found | {"joints": slice(int(ends[-1]), None)}
 
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lpet_sim.errors import SpecError
 from lpet_sim.recording.arrays import Array, Ints
@@ -45,7 +46,7 @@ class WheelParts:
     suspension: tuple[str, ...]
 
     @property
-    def steered(self) -> Array:
+    def steered(self) -> NDArray[np.bool_]:
         """Whether each wheel steers, Shape (w,)."""
         return self.steer >= 0
 

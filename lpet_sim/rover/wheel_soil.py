@@ -72,8 +72,9 @@ class WheelState:
     @classmethod
     def of(cls, wheels: int) -> WheelState:
         """Make the state of so many wheels without load or motion, on the first soil."""
-        zeros = (np.zeros(wheels) for _ in range(4))
-        return cls(*zeros, np.zeros(wheels, dtype=np.int64), np.zeros(wheels, dtype=np.bool_))
+        traction, side, load, omega = np.zeros((4, wheels))
+        soil, on_rock = np.zeros(wheels, dtype=np.int64), np.zeros(wheels, dtype=np.bool_)
+        return cls(traction, side, load, omega, soil, on_rock)
 
 
 @dataclass

@@ -35,7 +35,9 @@ class RoverArtist:
         """Draw the shapes of a rover."""
         self._writer, self._spec = writer, spec
         self._drawing = rover_drawing(spec)
-        writer.draw_rover([_drawn(link) for link in self._drawing.links if link.parent or link.meshes])
+        writer.draw_rover(
+            [_drawn(link) for link in self._drawing.links if link.parent or link.meshes]
+        )
 
     def draw(self, truth: Truth) -> None:
         """Draw the moving joints of a piece of truth, twice a second."""
