@@ -18,7 +18,7 @@ import numpy as np
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rover.model_parts import Parts, Wheel
-from lpet_sim.rover.model_source import compiled, read_source
+from lpet_sim.rover.model_source import compiled, read_source, take_globals
 from lpet_sim.rover.model_spec import CameraMountSpec, MotorSpec, MountSpec, RoverModelSpec
 
 OWN = "own/"
@@ -47,14 +47,16 @@ def fitted(spec: RoverModelSpec) -> mujoco.MjSpec:
     model = compiled(read_source(spec), spec.path)
     parts = Parts(model, spec)
     source = read_source(spec)
+    _hold_still(source, parts.moving)
     _turn_round(source, parts, spec)
-    _damp(source, parts, spec, _share(model, parts, spec))
+    _damp(source, spec, _share(model, parts, spec))
     canvas = _canvas(spec)
     body = canvas.worldbody.add_body(name="body")
     body.add_freejoint(name="body")
     # Where the root stands in the user's own world says nothing.
     T_world_root = SE3.from_quat_wxyz(model.body_quat[1], model.body_pos[1])
     frame = body.add_frame(**_place(parts.T_body_root @ T_world_root.inverse()))
+    take_globals(source, canvas)
     canvas.attach(source, prefix=OWN, frame=frame)
     _add_wheels(canvas, parts, spec, _share(model, parts, spec))
     _add_sites(canvas, parts, spec)
@@ -90,6 +92,16 @@ def _share(model: Any, parts: Parts, spec: RoverModelSpec) -> _Share:
     return _Share(torque, mass * parts.radius_m**2)
 
 
+def _hold_still(source: mujoco.MjSpec, moving: frozenset[str]) -> None:
+    """Take out every other joint, with the equalities that need it."""
+    for tie in list(source.equalities):
+        if tie.type == mujoco.mjtEq.mjEQ_JOINT and not {tie.name1, tie.name2} - {""} <= moving:
+            source.delete(tie)
+    for joint in list(source.joints):
+        if joint.name not in moving:
+            source.delete(joint)
+
+
 def _turn_round(source: mujoco.MjSpec, parts: Parts, spec: RoverModelSpec) -> None:
     """Let every drive roll forward and every steering joint turn left where it is positive."""
     for wheel in parts.wheels:
@@ -117,12 +129,11 @@ def _flip(joint: Any, backward: bool) -> None:
         joint.axis = -np.asarray(joint.axis)
 
 
-def _damp(source: mujoco.MjSpec, parts: Parts, spec: RoverModelSpec, share: _Share) -> None:
+def _damp(source: mujoco.MjSpec, spec: RoverModelSpec, share: _Share) -> None:
     """Damp the suspension joints that have no damping of their own."""
-    moved = {joint.name for wheel in parts.wheels for joint in (wheel.drive, wheel.steer) if joint}
     damping = spec.suspension_damping_nms_rad
     for joint in source.joints:
-        if joint.name not in moved and not joint.damping[0]:
+        if joint.name in spec.suspension and not joint.damping[0]:
             joint.damping[0] = 2.2 * share.torque_nm if damping is None else damping
 
 

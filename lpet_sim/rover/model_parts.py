@@ -90,6 +90,8 @@ class Parts:
         self.wheels = tuple(self._wheel(part) for part in spec.wheels)
         self.radius_m, self.width_m = self._size("radius", 0), self._size("width", 1)
         _check_axles(self.wheels)
+        for name in spec.suspension:
+            self._hinge(name, "suspension")
 
     def link_in_body(self, name: str) -> SE3:
         """Give ``T_body_link`` with every joint at zero."""
@@ -146,9 +148,7 @@ class Parts:
             UnknownNameError: There is no such joint.
             SpecError: It is no hinge, or leans from the axis by more than 5 deg.
         """
-        joint = self._model.joint(self._known("jnt", what, name))
-        if int(joint.type[0]) != int(mujoco.mjtJoint.mjJNT_HINGE):
-            raise SpecError(f"joint '{name}' ({what}) is no hinge; it must turn about one axis")
+        joint = self._hinge(name, what)
         link = self._model.body(int(joint.bodyid[0])).name
         axis = self.link_in_body(link).rotation @ joint.axis
         if abs(axis @ along) < _TILTED:
@@ -160,6 +160,19 @@ class Parts:
             )
         limit = limit_of(*map(float, joint.range)) if self._limited(joint) else limit_of(0.0, 0.0)
         return Joint(name, link, bool(axis @ along < 0), limit)
+
+    def _hinge(self, name: str, what: str) -> Any:
+        joint = self._model.joint(self._known("jnt", what, name))
+        if int(joint.type[0]) != int(mujoco.mjtJoint.mjJNT_HINGE):
+            raise SpecError(f"joint '{name}' ({what}) is no hinge; it must turn about one axis")
+        return joint
+
+    @property
+    def moving(self) -> frozenset[str]:
+        """Names of the joints that move: those of wheels, and the suspension's."""
+        pairs = [(wheel.drive, wheel.steer) for wheel in self.wheels]
+        named = {joint.name for pair in pairs for joint in pair if joint is not None}
+        return frozenset(named | set(self._spec.suspension))
 
     def _limited(self, joint: Any) -> bool:
         return bool(self._model.jnt_limited[joint.id])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,25 @@ def read_source(spec: RoverModelSpec) -> mujoco.MjSpec:
     _free(source, source.body(root.name), spec.path)
     source.compiler.fusestatic = False
     return source
+
+
+def take_globals(source: mujoco.MjSpec, canvas: mujoco.MjSpec) -> None:
+    """Put solver, sizes and looks of one model in place of another's, so that they agree."""
+    for section in ("option", "visual", "stat"):
+        _copy(getattr(canvas, section), getattr(source, section))
+    for size in (name for name in dir(canvas) if name.startswith("nuser")):
+        setattr(source, size, getattr(canvas, size))
+    for size in ("memory", "njmax", "nconmax", "nstack", "nkey"):
+        setattr(source, size, getattr(canvas, size))
+
+
+def _copy(from_: Any, to: Any) -> None:
+    for name in (name for name in dir(from_) if not name.startswith("_")):
+        value = getattr(from_, name)
+        if type(value).__module__.startswith("mujoco.") and not isinstance(value, Enum):
+            _copy(value, getattr(to, name))
+        elif not callable(value):
+            setattr(to, name, value)
 
 
 def _told(path: Path, work: Callable[[], Any]) -> Any:

@@ -160,6 +160,8 @@ class RoverModelSpec(Spec):
         camera: Where the left eye sits, at its centre of projection.
         camera_right: The same of the right eye; None where the cameras' baseline says it.
         belly: What rests on rocks under the body; None for nothing.
+        suspension: The joints that swing freely. Every other one that is not a wheel's (of a mast,
+            an arm, a wheel that is not to steer) is held where the model has it.
         differentials: Pairs of suspension joints of which one turns back as far as the other turns
             forward, as the two rockers of a rocker suspension.
         suspension_damping_nms_rad: Damping of the suspension joints that the model gives none, so
@@ -179,6 +181,7 @@ class RoverModelSpec(Spec):
     camera: CameraMountSpec = CameraMountSpec()
     camera_right: CameraMountSpec | None = None
     belly: BellySpec | None = None
+    suspension: tuple[Name, ...] = ()
     differentials: tuple[tuple[Name, Name], ...] = ()
     suspension_damping_nms_rad: NotNegative | None = None
     motors: MotorSpec = MotorSpec()
@@ -198,6 +201,12 @@ class RoverModelSpec(Spec):
             twice = [name for name, count in named.items() if name is not None and count > 1]
             if twice:
                 raise ValueError(f"two wheels have the {what} '{twice[0]}'; each needs its own")
+        for name in (name for pair in self.differentials for name in pair):
+            if name not in self.suspension and not self.complete:
+                raise ValueError(
+                    f"differentials: joint '{name}' is held still; name it in suspension too, "
+                    f"which has {', '.join(self.suspension) or 'none'}"
+                )
         lacks = [wheel.name for wheel in self.wheels if wheel.drive is None]
         if lacks and not self.complete:
             raise ValueError(

@@ -103,6 +103,7 @@ def _others(model: Any, wheels: set[int]) -> tuple[str, ...]:
     for k in left:
         if not is_hinge(model, k):
             raise SpecError(
-                f"joint '{model.joint(k).name}' is no hinge; a suspension has hinges only"
+                f"joint '{model.joint(k).name.removeprefix('own/')}' is no hinge; a suspension has "
+                "hinges only"
             )
     return tuple(model.joint(k).name for k in left)
