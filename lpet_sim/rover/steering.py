@@ -2,7 +2,10 @@
 
 Wheels that steer roll along their own circle about the common centre (`kinematics`). Those that do
 not turn at the speed of their own forward motion: beside steered ones they stand on one axle that
-passes under the body's origin and roll too; where no wheel steers they skid.
+passes under the body's origin, and roll too. Where no wheel steers all skid: the yaw rate is less
+than that of wheels that roll, by the share ``sum y_i^2 / sum (x_i^2 + y_i^2)`` if creep along and
+across is alike, which is also what the least squares of wheel odometry reads. On an arc their
+speeds are set apart by that much more.
 """
 
 from __future__ import annotations
@@ -41,8 +44,10 @@ class Steering:
         self._xy = frames.wheel_position_body_m[:, :2]
         self._names, self._limit_rad = frames.wheel_names, frames.steer_limit_rad
         self.steered = self._limit_rad > 0
+        squares = np.square(self._xy).sum(axis=0)
+        self._yaw_share = float(squares[1] / squares.sum()) if self.skids else 1.0
         if self.skids:
-            self.max_curvature = float(1.0 / np.abs(self._xy[:, 1]).max())
+            self.max_curvature = self._yaw_share / float(np.abs(self._xy[:, 1]).max())
         else:
             limit = float(self._limit_rad[self.steered].min())
             self.max_curvature = max_curvature(self._xy[self.steered], limit)
@@ -71,8 +76,13 @@ class Steering:
         return np.where(self.steered, steering_of_point_turn(self._xy), 0.0)
 
     def speeds(self, speed_mps: float, yaw_rate_radps: float) -> Array:
-        """Give the ground speeds of the wheels for a motion of the body [m/s], Shape (w,)."""
-        ahead = speed_mps - yaw_rate_radps * self._xy[:, 1]
+        """Give the ground speeds of the wheels for a motion of the body [m/s], Shape (w,).
+
+        A rover that skids is asked for no more speed in a turn on the spot than one that rolls,
+        and turns more slowly.
+        """
+        share = self._yaw_share if speed_mps else 1.0
+        ahead = speed_mps - yaw_rate_radps / share * self._xy[:, 1]
         rolling = wheel_motion(self._xy, speed_mps, yaw_rate_radps)[1]
         return np.where(self.steered, rolling, ahead)
 
