@@ -77,7 +77,7 @@ def test_slip_on_a_slope_is_that_of_the_soils_table(model: str) -> None:
 
 @pytest.mark.parametrize("model", ["prospector", "scout"])
 def test_a_parked_rover_stays_and_its_wheels_carry_its_weight(model: str) -> None:
-    """Half a minute on 10 deg: less than 0.2 mm; loads add up to m g cos to 2 %, without flicker."""
+    """Half a minute on 10 deg: less than 0.2 mm; loads add up to m g cos in 2 %, unflickering."""
     slope = math.radians(10.0)
     scene = build_scene(tilted(math.tan(slope)), RoverSpec(model=model))
     for _ in range(1000):
