@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lpet_sim.errors import UnknownNameError
+from lpet_sim.geometry import SE3
 from lpet_sim.rover.frames import RoverFrames
 from lpet_sim.rover.ground import cut_patch
 from lpet_sim.rover.mjcf import spec_on
@@ -120,8 +121,10 @@ def _camera(scene: Scene, view: PictureView) -> Any:
     camera = mujoco.MjvCamera()
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
     size = _size_m(scene.frames)
-    camera.lookat[:] = scene.body_row()[:3] + np.array([0.0, 0.0, 0.2 * size])
-    camera.distance = 1.9 * size
+    middle = scene.frames.wheel_position_body_m.mean(axis=0) * [1.0, 1.0, 0.0]
+    body = SE3.from_quat_wxyz(scene.body_row()[3:7], scene.body_row()[:3])
+    camera.lookat[:] = body @ middle + [0.0, 0.0, 0.15 * size]
+    camera.distance = 2.1 * size
     camera.azimuth = np.degrees(view.azimuth_rad + scene.yaw_rad)
     camera.elevation = -np.degrees(view.elevation_rad)
     return camera
@@ -141,6 +144,7 @@ def _render(model: Any, data: Any, camera: Any, view: PictureView) -> NDArray[np
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, context)
         option, scene = mujoco.MjvOption(), mujoco.MjvScene(model, maxgeom=4000)
         option.geomgroup[_HIDDEN_GROUPS] = 0
+        option.sitegroup[:] = 0
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         perturb = mujoco.MjvPerturb()
         mujoco.mjv_updateScene(model, data, option, perturb, camera, everything, scene)
