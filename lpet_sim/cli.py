@@ -15,6 +15,7 @@ from lpet_sim.cli_formats import export_app, import_app
 from lpet_sim.cli_reach import reach
 from lpet_sim.cli_report import report
 from lpet_sim.cli_rig import rig_app
+from lpet_sim.cli_rover import check_rover
 from lpet_sim.cli_study import study
 from lpet_sim.cli_sweep import sweep
 from lpet_sim.cli_tradeoff import tradeoff
@@ -33,6 +34,7 @@ app.add_typer(import_app, name="import")
 app.add_typer(export_app, name="export")
 app.add_typer(rig_app, name="rig")
 app.command()(reach)
+app.command("check-rover")(check_rover)
 app.command()(study)
 app.command()(report)
 app.command()(sweep)

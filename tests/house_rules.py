@@ -64,6 +64,7 @@ MAY_IMPORT["cli_reach"] = {*MAY_IMPORT} - {
     "cli_formats",
 }
 MAY_IMPORT["cli_tradeoff"] = MAY_IMPORT["cli_reach"]
+MAY_IMPORT["cli_rover"] = MAY_IMPORT["cli_reach"]
 MAY_IMPORT["cli_study"] = {*MAY_IMPORT} - {
     "cli_rig",
     "cli_report",
@@ -71,6 +72,7 @@ MAY_IMPORT["cli_study"] = {*MAY_IMPORT} - {
     "cli_formats",
     "cli_reach",
     "cli_tradeoff",
+    "cli_rover",
 }
 MAY_IMPORT["cli"] = {*MAY_IMPORT}
 """Which rooms each room may import, besides itself."""
@@ -78,6 +80,10 @@ MAY_IMPORT["cli"] = {*MAY_IMPORT}
 QUARANTINE: dict[str, set[str]] = {
     "mujoco": {
         "lpet_sim/rover/mjcf.py",
+        "lpet_sim/rover/model_fit.py",
+        "lpet_sim/rover/model_parts.py",
+        "lpet_sim/rover/model_source.py",
+        "lpet_sim/rover/picture.py",
         "lpet_sim/rover/scene.py",
         "lpet_sim/sensors/render_scene.py",
     },
@@ -102,6 +108,7 @@ QUARANTINE: dict[str, set[str]] = {
         "lpet_sim/cli_reach.py",
         "lpet_sim/cli_report.py",
         "lpet_sim/cli_rig.py",
+        "lpet_sim/cli_rover.py",
         "lpet_sim/cli_study.py",
         "lpet_sim/cli_sweep.py",
         "lpet_sim/cli_tradeoff.py",

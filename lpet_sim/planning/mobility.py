@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from lpet_sim.recording.arrays import Array
+from lpet_sim.rover.frames import RoverFrames
+from lpet_sim.rover.steering import Steering
 from lpet_sim.spec import Spec
 from lpet_sim.terrain.rock_set import Rocks
 
@@ -83,6 +85,36 @@ class MobilitySpec(Spec):
                 "between the wheels less the margin"
             )
         return self
+
+    @classmethod
+    def of_rover(cls, frames: RoverFrames, belly_height_m: float) -> Self:
+        """Make the spec of any rover: its footprint from the model, the rest as for our own.
+
+        Rocks are climbed up to a wheel's radius; the belly keeps 0.08 m for uneven ground and
+        sinkage, and rocks between the wheels 0.09 m to each side (assumptions, as above). A rover
+        whose steering does not let it turn on the spot drives arcs forwards and backwards.
+
+        Args:
+            frames: The rover's frames.
+            belly_height_m: Height of its belly above flat ground.
+        """
+        x, y = frames.wheel_position_body_m[:, 0], frames.wheel_position_body_m[:, 1]
+        radius, width = frames.wheel_radius_m, frames.wheel_width_m
+        steering, margin = Steering(frames), cls.model_fields["margin_m"].default
+        half_width = float(np.abs(y).max()) + width / 2
+        turns = steering.why_no_point_turn() is None
+        return cls(
+            climb_height_m=radius,
+            belly_height_m=max(belly_height_m - 0.08, 0.0),
+            straddle_width_m=max(2 * (half_width - width - margin), 0.0),
+            slope_scale_m=float(np.ptp(x)),
+            turning="point_turn" if turns else "reeds_shepp",
+            turn_radius_m=max(1.5, 1.0 / steering.max_curvature),
+            front_m=float(x.max()) + radius,
+            rear_m=radius - float(x.min()),
+            half_width_m=half_width,
+            wheel_width_m=width,
+        )
 
     @property
     def front_kept_m(self) -> float:

@@ -132,7 +132,7 @@ class ImuCalibration(Spec):
 
 
 class WheelCalibration(Spec):
-    """What is declared of the wheels, in the order front left, front right, middle, rear.
+    """What is declared of the wheels, in the order of `names`.
 
     Attributes:
         names: Names of the wheels.

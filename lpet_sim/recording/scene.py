@@ -42,13 +42,13 @@ class DrawnLink:
 
     Attributes:
         name: The part's name; its motion is given under it.
-        mesh: Its shape in its own frame.
+        mesh: Its shape in its own frame; None for a part that only carries others.
         parent: The part it hangs on, "" for the body.
         T_parent_link: Its pose until it is moved.
     """
 
     name: str
-    mesh: Mesh
+    mesh: Mesh | None
     parent: str = ""
     T_parent_link: SE3 = field(default_factory=SE3.identity)
 

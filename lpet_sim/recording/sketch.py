@@ -83,7 +83,8 @@ class Sketch:
             entity = f"{self._links[link.parent]}/{layout.slug(link.name)}"
             self._links[link.name] = entity
             self._pen.pose(entity, link.T_parent_link)
-            self._pen.mesh(f"{entity}/mesh", link.mesh)
+            if link.mesh is not None:
+                self._pen.mesh(f"{entity}/mesh", link.mesh)
 
     def motion(self, t_ns: Ints, motions: Mapping[str, SE3]) -> None:
         """Move parts of the rover in their parents, thinned to `MOTION_PERIOD_NS`."""

@@ -117,6 +117,6 @@ def _ratio(above: Array, below: Array, least: Array | float) -> Array:
 
 
 def _short(name: str) -> str:
-    """Shorten ``front_left`` to ``FL``, for a legend beside six curves."""
+    """Shorten ``front_left`` to ``FL``, for a legend beside the curves."""
     parts = name.split("_")
     return "".join(part[0] for part in parts).upper() if len(parts) > 1 else name

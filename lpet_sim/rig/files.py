@@ -16,12 +16,12 @@ from lpet_sim.outputs import whole_file
 from lpet_sim.rig.slope import SlopeReport
 from lpet_sim.rig.slope_point import SlopePoint
 from lpet_sim.rig.wheel import WheelCurve, slip_scale
-from lpet_sim.rover.mjcf import WHEELS
+from lpet_sim.rover.model_spec import wheel_names
 
 Cell = str | float | None
 
 _PER_WHEEL = ("slip_percent", "load_N", "traction_over_load", "sinkage_mm")
-SLOPE_HEADER = (
+_SLOPE_HEADER = (
     "heading",
     "slope_deg",
     "ended",
@@ -31,7 +31,6 @@ SLOPE_HEADER = (
     "turned_deg",
     "sinkage_mm",
     "rolled_m",
-    *(f"{wheel}_{quantity}" for quantity in _PER_WHEEL for wheel in WHEELS),
 )
 WHEEL_HEADER = (
     "slip_percent",
@@ -45,13 +44,20 @@ WHEEL_HEADER = (
 )
 
 
+def slope_header(wheels: Sequence[str]) -> tuple[str, ...]:
+    """Name the columns of a slope rig's points, for a rover with these wheels."""
+    each = (f"{wheel}_{quantity}" for quantity in _PER_WHEEL for wheel in wheels)
+    return (*_SLOPE_HEADER, *each)
+
+
 def write_slope_csv(report: SlopeReport, path: Path) -> None:
     """Write the points of a slope rig.
 
     Raises:
         OutputError: The file cannot be written.
     """
-    _write(path, SLOPE_HEADER, (_slope_row(point) for point in report.points))
+    header = slope_header(wheel_names(report.spec.rover.model))
+    _write(path, header, (_slope_row(point) for point in report.points))
 
 
 def write_wheel_csv(curve: WheelCurve, path: Path) -> None:

@@ -23,7 +23,7 @@ from lpet_sim.rig.bed import TiltBed
 from lpet_sim.rig.published import published_beside
 from lpet_sim.rig.slope_drive import drive_on_bed
 from lpet_sim.rig.slope_point import Heading, SlopePoint
-from lpet_sim.rover.mjcf import model_path, models_folder
+from lpet_sim.rover.model_spec import identity_of, load_rover_model, models_folder
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.soil.published import ReferenceWheelSpec
 from lpet_sim.soil.spec import MeasuredSoilSpec, SoilSpec
@@ -34,6 +34,7 @@ DEFAULT_SLOPES_RAD: Final = tuple(math.radians(deg) for deg in range(0, 31, 5))
 SLOPE_MAX_DEG: Final = 45.0
 HEADINGS: Final[tuple[Heading, ...]] = ("up", "down", "across")
 _SAME_SLOPE_RAD: Final = math.radians(0.25)
+_MODELS: Final = (".xml", ".urdf", ".yaml")
 _Key = tuple[float, Heading]
 _POINT: Final = TypeAdapter(SlopePoint)
 
@@ -85,7 +86,7 @@ def slope_spec(
         UnknownNameError: There is no such rover model.
         SpecError: A value out of its range.
     """
-    model_path(rover)
+    load_rover_model(rover)
     values = {
         "soil": soil,
         "rover": {"model": rover, "physics_dt_s": dt_s},
@@ -229,6 +230,8 @@ def _key(spec: SlopeSpec) -> str:
     del said["slopes_rad"], said["headings"]
     digest = hashlib.sha256(json.dumps(said).encode())
     package = Path(lpet_sim.__file__).parent
-    for path in (*sorted(package.rglob("*.py")), *sorted(models_folder().glob("*.xml"))):
+    digest.update(json.dumps(identity_of(spec.rover.model)).encode())
+    models = sorted(path for path in models_folder().iterdir() if path.suffix in _MODELS)
+    for path in (*sorted(package.rglob("*.py")), *models):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:12]

@@ -82,8 +82,9 @@ class _StraightDrive:
     def __init__(self, scene: Scene, bed: TiltBed, speed_mps: float) -> None:
         self._scene, self._bed, self._speed_mps = scene, bed, speed_mps
         self._radius_m = scene.frames.wheel_radius_m
+        self._count = len(scene.frames.wheel_names)
         self._rate_radps = speed_mps / self._radius_m
-        self._log = TruthLog(self._radius_m)
+        self._log = TruthLog(self._radius_m, len(scene.frames.wheel_names))
         self._dt_s = scene.spec.physics_dt_s
         self._sample_steps = max(1, round(_SAMPLE_S / self._dt_s))
         self._step = 0
@@ -98,7 +99,7 @@ class _StraightDrive:
         last = self._windows[-2:]
         slip = np.mean([window.slip for window in last], axis=0)
         if ended == "slides":
-            slip = np.full(6, self._slip_of_slide())
+            slip = np.full(self._count, self._slip_of_slide())
         if ended == "steady" and slip.mean() >= 1.0:
             ended = "slides back"
         return SlopePoint(
@@ -160,7 +161,8 @@ class _StraightDrive:
         share = min(1.0, self._step * self._dt_s / _RAMP_S)
         self._scene.follow()
         self._scene.refresh_soil()
-        self._scene.command(np.zeros(6), np.full(6, share * rate_radps))
+        still = np.zeros(self._count)
+        self._scene.command(still, still + share * rate_radps)
         for _ in range(self._sample_steps):
             self._scene.step()
         self._step += self._sample_steps
@@ -228,7 +230,7 @@ class _StraightDrive:
         return SE3.from_quat_wxyz(row[3:7], row[:3])
 
     def _angle(self) -> float:
-        return float(self._scene.wheel_row()[:6].mean())
+        return float(self._scene.wheel_row()[: self._count].mean())
 
     def _rolled_m(self) -> float:
         return self._radius_m * (self._angle() - self._angle_start)

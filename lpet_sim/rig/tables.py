@@ -17,7 +17,7 @@ from lpet_sim.rig.slope import SlopeReport
 from lpet_sim.rig.slope_figure import published_label
 from lpet_sim.rig.slope_point import Heading, SlopePoint
 from lpet_sim.rig.wheel import WheelCurve, slip_scale
-from lpet_sim.rover.mjcf import WHEELS
+from lpet_sim.rover.model_spec import wheel_names
 from lpet_sim.soil.load import load_soil, soil_names
 from lpet_sim.soil.published import PublishedCurve
 
@@ -81,7 +81,7 @@ def _wheels_table(report: SlopeReport) -> Table:
     table = Table(title="Wheel by wheel: slip [%], traction over load, load [N]")
     table.add_column("heading")
     table.add_column(Text("slope [deg]"), justify="right")
-    for wheel in WHEELS:
+    for wheel in wheel_names(report.spec.rover.model):
         table.add_column(wheel.replace("_", " "), justify="right")
     for point in report.points:
         wheels = zip(point.wheel_slip, point.wheel_traction, point.wheel_load_n, strict=True)

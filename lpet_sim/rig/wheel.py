@@ -11,7 +11,7 @@ from pydantic import Field
 
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rover.frames import rover_frames
-from lpet_sim.rover.mjcf import model_path
+from lpet_sim.rover.model_spec import load_rover_model, model_names
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.soil.published import ReferenceWheelSpec
 from lpet_sim.soil.slip_table import (
@@ -106,10 +106,10 @@ def rover_wheel(model: str) -> ReferenceWheelSpec:
     Raises:
         UnknownNameError: There is no such rover model.
     """
-    frames = rover_frames(RoverSpec(model=model))
+    frames, path = rover_frames(RoverSpec(model=model)), load_rover_model(model).path
     return ReferenceWheelSpec(
         name=f"wheel of {model}",
-        source=f"models/{model}.xml",
+        source=f"models/{path.name}" if model in model_names() else str(path),
         radius_m=frames.wheel_radius_m,
         width_m=frames.wheel_width_m,
         load_n=frames.wheel_share_n,
@@ -139,7 +139,7 @@ def wheel_rig_spec(
         UnknownNameError: There is no such rover model.
         SpecError: A value out of its range.
     """
-    model_path(rover)
+    load_rover_model(rover)
     of = wheel or rover_wheel(rover)
     test = {"load_n": load_n, "gravity_mps2": gravity_mps2}
     given = {name: value for name, value in test.items() if value is not None}

@@ -1,41 +1,24 @@
 """What the rover looks like: coloured meshes on links that move with the joints.
 
 For drawing only, by viewers that know no simulator. `WheelTruth` holds all the joint angles:
-``drive_<wheel>`` and ``steer_<wheel>`` in the order of the wheels, and the suspension's
-``bogie_*`` in the order of `RoverFrames.suspension_joints`.
+those of drives and steering in the order of the wheels, and the suspension's in the order of
+`RoverFrames.suspension_joints`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lpet_sim.geometry import SE3, so3
-from lpet_sim.recording.arrays import Array, Ints
+from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.truth import WheelTruth
-from lpet_sim.rover.frames import rover_frames
-from lpet_sim.rover.mjcf import VISUAL_GROUP, WHEELS, bare_model, geom_kind
+from lpet_sim.rover.mjcf import VISUAL_GROUP, bare_model
+from lpet_sim.rover.shapes import LinkMesh, drawn_shape
 from lpet_sim.rover.spec import RoverSpec
-
-_SIDES = 24
-
-
-@dataclass(frozen=True)
-class LinkMesh:
-    """A shape on a link.
-
-    Attributes:
-        vertices: In the link [m], Shape (v, 3).
-        faces: Triangles, outward, Shape (f, 3).
-        rgba: Colour, 0..1, Shape (4,).
-    """
-
-    vertices: Array
-    faces: Ints
-    rgba: NDArray[np.float32]
+from lpet_sim.rover.wheel_parts import wheel_parts
 
 
 @dataclass(frozen=True)
@@ -47,8 +30,9 @@ class Link:
         parent: Name of the link it hangs on; None for ``body``.
         T_parent_link: Its pose in the parent with the joint at zero.
         joint: Name of the hinge between parent and link, None where it is fixed.
-        axis: Axis of the hinge in the link, through its origin, Shape (3,).
+        axis: Axis of the hinge in the link, Shape (3,).
         meshes: Its shapes.
+        anchor_m: A point of the hinge's axis in the link, Shape (3,); its origin for most.
     """
 
     name: str
@@ -57,11 +41,13 @@ class Link:
     joint: str | None
     axis: Array
     meshes: tuple[LinkMesh, ...]
+    anchor_m: Array = field(default_factory=lambda: np.zeros(3))
 
     def T_parent_link_at(self, angle_rad: Array) -> SE3:
         """Give the poses in the parent for joint angles [rad], Shape (n,)."""
         turn = so3.exp(np.asarray(angle_rad)[..., None] * self.axis)
-        return self.T_parent_link @ SE3(turn, np.zeros((*turn.shape[:-2], 3)))
+        shift = self.anchor_m - turn @ self.anchor_m
+        return self.T_parent_link @ SE3(turn, shift)
 
 
 @dataclass(frozen=True)
@@ -94,51 +80,19 @@ def _link(spec: RoverSpec, index: int) -> Link:
         T_parent_link=SE3.from_quat_wxyz(body.quat, body.pos),
         joint=None if joint is None else joint.name,
         axis=np.zeros(3) if joint is None else np.array(joint.axis),
-        meshes=tuple(_mesh(spec, k) for k in shown),
+        anchor_m=np.zeros(3) if joint is None else np.array(joint.pos),
+        meshes=tuple(drawn_shape(model, k) for k in shown),
     )
-
-
-def _mesh(spec: RoverSpec, geom: int) -> LinkMesh:
-    model = bare_model(spec.model)
-    size = model.geom_size[geom]
-    shape = _box(size) if geom_kind(model, geom) == "box" else _cylinder(size[0], size[1])
-    vertices, faces = shape
-    T_link_geom = SE3.from_quat_wxyz(model.geom_quat[geom], model.geom_pos[geom])
-    return LinkMesh(T_link_geom @ vertices, faces, model.geom_rgba[geom].copy())
-
-
-def _box(half: Array) -> tuple[Array, Ints]:
-    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
-
-
-def _cylinder(radius: float, half_length: float) -> tuple[Array, Ints]:
-    """Give a closed cylinder about z: two rings, then the centres of bottom and top."""
-    angle = np.arange(_SIDES) * 2 * np.pi / _SIDES
-    ring = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-    low = np.column_stack([ring, np.full(_SIDES, -half_length)])
-    high = np.column_stack([ring, np.full(_SIDES, half_length)])
-    i, j = np.arange(_SIDES), (np.arange(_SIDES) + 1) % _SIDES
-    bottom, top = np.full(_SIDES, 2 * _SIDES), np.full(_SIDES, 2 * _SIDES + 1)
-    parts = [
-        (i, j, j + _SIDES),
-        (i, j + _SIDES, i + _SIDES),
-        (bottom, j, i),
-        (top, i + _SIDES, j + _SIDES),
-    ]
-    faces = np.concatenate([np.stack(part, axis=1) for part in parts])
-    caps = np.array([[0.0, 0.0, -half_length], [0.0, 0.0, half_length]])
-    return np.concatenate([low, high, caps]), faces
 
 
 def joint_angles(spec: RoverSpec, wheels: WheelTruth) -> dict[str, Array]:
     """Name the joint angles of a wheel truth [rad], Shape (n,) each."""
-    names = rover_frames(spec).suspension_joints
-    angles = {name: wheels.joint_angle_rad[:, k] for k, name in enumerate(names)}
-    for k, wheel in enumerate(WHEELS):
-        angles[f"drive_{wheel}"] = wheels.drive_angle_rad[:, k]
-        angles[f"steer_{wheel}"] = wheels.steer_angle_rad[:, k]
+    parts, model = wheel_parts(spec.model), bare_model(spec.model)
+    angles = {name: wheels.joint_angle_rad[:, k] for k, name in enumerate(parts.suspension)}
+    for k, (drive, steer) in enumerate(zip(parts.drive, parts.steer, strict=True)):
+        angles[model.joint(int(drive)).name] = wheels.drive_angle_rad[:, k]
+        if steer >= 0:
+            angles[model.joint(int(steer)).name] = wheels.steer_angle_rad[:, k]
     return angles
 
 

@@ -12,12 +12,13 @@ import numpy as np
 from lpet_sim.errors import PlanningError, SpecError
 from lpet_sim.recording.arrays import NS_PER_S
 from lpet_sim.recording.truth import Event, Truth, in_order
+from lpet_sim.rover.drivable import check_drivable, reach_of
 from lpet_sim.rover.episodes import Watch
 from lpet_sim.rover.faults import Faults
 from lpet_sim.rover.follower import Follower
 from lpet_sim.rover.hazards import ends_drive, hazards_of
 from lpet_sim.rover.observer import Observer, Tick
-from lpet_sim.rover.scene import Scene, check_drivable
+from lpet_sim.rover.scene import Scene
 from lpet_sim.rover.spec import DriveSpec
 from lpet_sim.rover.truth_log import TruthLog
 
@@ -61,7 +62,9 @@ def drive(scene: Scene, spec: DriveSpec, chunk_s: float = 10.0) -> Iterator[Trut
 
     Raises:
         SpecError: A rate does not divide the physics rate.
-        PlanningError: The path leaves the drivable ground, or the rover is not at its start.
+        PlanningError: The path leaves the drivable ground, the rover is not at its start, or its
+            steering cannot do what the path asks.
+        UnknownNameError: A wheel that is to be stuck is none of the rover's.
     """
     ticks = _ticks(spec, scene.spec.physics_dt_s, chunk_s)
     follower = Follower(spec, scene.spec, scene.frames)
@@ -93,7 +96,8 @@ def _check_path(scene: Scene, spec: DriveSpec, follower: Follower) -> None:
             f"the rover stands {away:.1f} m from the first waypoint; build the scene at "
             f"{spec.waypoints_m[0]}, or within {_START_TOLERANCE_M} m"
         )
-    check_drivable(scene.ground, np.concatenate([leg.xy for leg in follower.legs]))
+    path = np.concatenate([leg.xy for leg in follower.legs])
+    check_drivable(scene.ground, path, reach_of(scene.frames))
 
 
 class _Drive:
@@ -101,12 +105,12 @@ class _Drive:
 
     def __init__(self, scene: Scene, spec: DriveSpec, follower: Follower, ticks: _Ticks) -> None:
         self._scene, self._spec, self._follower, self._ticks = scene, spec, follower, ticks
-        self._log = TruthLog(scene.frames.wheel_radius_m)
+        self._log = TruthLog(scene.frames.wheel_radius_m, len(scene.frames.wheel_names))
         self._dt_ns = round(scene.spec.physics_dt_s * NS_PER_S)
         self._step = 0
         self._ended = False
         self._limit_s = spec.time_limit_s or 3.0 * follower.nominal_s
-        self._faults = Faults(spec)
+        self._faults = Faults(spec, scene.frames.wheel_names)
         self._observer = Observer(ticks.control * scene.spec.physics_dt_s)
         hazards = hazards_of(spec.failures, scene.frames, scene.ground.drivable)
         self._watches = [Watch(fault) for fault in self._faults.all]
@@ -149,7 +153,8 @@ class _Drive:
         return self._log.take()
 
     def _settle(self) -> None:
-        self._scene.command(np.zeros(6), np.zeros(6))
+        still = np.zeros(len(self._scene.frames.wheel_names))
+        self._scene.command(still, still)
         for _ in range(round(self._spec.settle_s / self._scene.spec.physics_dt_s)):
             if not self._has_stepped():
                 self._end("unstable", "the physics became unstable before the drive")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from lpet_sim.errors import UnknownNameError
 from lpet_sim.recording.arrays import Array
-from lpet_sim.rover.mjcf import WHEELS
 from lpet_sim.rover.observer import Tick
 from lpet_sim.rover.spec import DriveSpec, ForcedSlip, StuckWheel
 
@@ -39,15 +41,24 @@ class Faults:
         all: Every one of them.
     """
 
-    def __init__(self, spec: DriveSpec) -> None:
-        """Read them from the spec."""
+    def __init__(self, spec: DriveSpec, wheels: Sequence[str]) -> None:
+        """Read them from the spec.
+
+        Args:
+            spec: The drive.
+            wheels: Names of the rover's wheels.
+
+        Raises:
+            UnknownNameError: A wheel that is to be stuck is none of the rover's.
+        """
+        check_stuck_wheels(spec, wheels)
         self._slips = [
             Fault("forced_slip", slip.start_s, slip.start_s + slip.duration_s, _slip_text(slip))
             for slip in spec.forced_slips
         ]
         self._locks = [
             (
-                WHEELS.index(stuck.wheel),
+                list(wheels).index(stuck.wheel),
                 Fault("stuck_wheel", stuck.start_s, stuck.end_s, _lock_text(stuck)),
             )
             for stuck in spec.stuck_wheels
@@ -59,7 +70,7 @@ class Faults:
         return any(slip.lasts(t_s) for slip in self._slips)
 
     def lock(self, t_s: float, rate_radps: Array) -> Array:
-        """Give the wheels' rates with 0 for those that are stuck at a time [s], Shape (6,).
+        """Give the wheels' rates with 0 for those that are stuck at a time [s], Shape (w,).
 
         A drive that is told not to turn brakes with the motor's whole torque: more than friction
         can put on a wheel that carries its share of the weight.
@@ -69,6 +80,17 @@ class Faults:
             rate_radps = rate_radps.copy()
             rate_radps[np.array(stuck)] = 0.0
         return rate_radps
+
+
+def check_stuck_wheels(spec: DriveSpec, wheels: Sequence[str]) -> None:
+    """Hold the wheels that are to be stuck to be wheels of the rover.
+
+    Raises:
+        UnknownNameError: One is not.
+    """
+    for k, stuck in enumerate(spec.stuck_wheels):
+        if stuck.wheel not in wheels:
+            raise UnknownNameError(f"wheel of drive.stuck_wheels.{k}", stuck.wheel, wheels)
 
 
 def _slip_text(slip: ForcedSlip) -> str:

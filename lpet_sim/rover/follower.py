@@ -15,14 +15,9 @@ import numpy as np
 
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rover.frames import RoverFrames
-from lpet_sim.rover.kinematics import (
-    max_curvature,
-    steering_of_arc,
-    steering_of_point_turn,
-    wheel_motion,
-)
 from lpet_sim.rover.path import Leg, plan_legs, wrap_angle
 from lpet_sim.rover.spec import DriveSpec, RoverSpec, Stop
+from lpet_sim.rover.steering import Steering
 
 FEEDBACK_LENGTH_M = 0.5
 _WINDOW_M = 0.5  # how far ahead the nearest point of the path is looked for
@@ -52,8 +47,8 @@ class Command:
     """What the wheels are told.
 
     Attributes:
-        steer_rad: Steering angles [rad], Shape (6,).
-        rate_radps: Turning rates [rad/s], Shape (6,).
+        steer_rad: Steering angles [rad], Shape (w,).
+        rate_radps: Turning rates [rad/s], Shape (w,).
         speed_mps: Forward speed that is asked of the body.
         yaw_rate_radps: Yaw rate that is asked of the body.
     """
@@ -87,18 +82,22 @@ class Follower:
     """
 
     def __init__(self, drive: DriveSpec, rover: RoverSpec, frames: RoverFrames) -> None:
-        """Plan the legs and stand at the start."""
+        """Plan the legs and stand at the start.
+
+        Raises:
+            PlanningError: The rover's steering cannot do what the path asks.
+        """
         self.legs = plan_legs(drive.waypoints_m, drive.min_turn_radius_m, drive.corner_cut_m)
         self.finished = False
         self.cross_track_m = 0.0
         self.progress_m = 0.0
         self._drive = drive
-        self._wheels_xy = frames.wheel_position_body_m[:, :2]
+        self._steering = Steering(frames)
+        self._steering.check(self.legs)
         self._radius_m = frames.wheel_radius_m
         self._dt_s = 1.0 / drive.control_rate_hz
         self._steer_step_rad = rover.steer_rate_radps * self._dt_s
-        self._max_curvature = max_curvature(self._wheels_xy, float(frames.steer_limit_rad.min()))
-        self._steer_rad = np.zeros(6)
+        self._steer_rad = np.zeros(len(frames.wheel_names))
         self._speed_mps = 0.0
         self._curvature = 0.0
         self._stops = list(drive.stops)
@@ -115,8 +114,7 @@ class Follower:
     @property
     def nominal_s(self) -> float:
         """Rough duration without slip: driving, turning and standing [s]."""
-        radius = float(np.hypot(*self._wheels_xy.T).max())
-        turns = math.pi * radius / self._drive.speed_mps * len(self.legs)
+        turns = math.pi * self._steering.lever_m / self._drive.speed_mps * len(self.legs)
         standing = sum(stop.duration_s for stop in self._drive.stops)
         return self.length_m / self._drive.speed_mps + turns + standing + 60.0
 
@@ -138,11 +136,11 @@ class Follower:
         self._pose = yield self._stand()
         for leg in self.legs:
             yield from self._turn_to(float(leg.heading_rad[0]))
-            yield from self._steer_to(steering_of_arc(self._wheels_xy, float(leg.curvature[0])))
+            yield from self._steer_to(self._steering.arc(float(leg.curvature[0])))
             yield from self._follow(leg)
 
     def _stand(self) -> Command:
-        return Command(self._steer_rad, np.zeros(6))
+        return Command(self._steer_rad, np.zeros(len(self._steer_rad)))
 
     def _steer_to(self, target_rad: Array) -> Program:
         """Turn the wheels at standstill."""
@@ -155,17 +153,17 @@ class Follower:
     def _turn_to(self, heading_rad: float) -> Program:
         """Turn on the spot until the body faces the heading."""
         angle = wrap_angle(heading_rad - self._pose.yaw_rad)
-        if abs(angle) < _SKIP_TURN_RAD:
+        if abs(angle) < _SKIP_TURN_RAD or self._steering.why_no_point_turn() is not None:
             return
-        yield from self._steer_to(steering_of_point_turn(self._wheels_xy))
-        lever = float(np.hypot(*self._wheels_xy.T).max())
+        yield from self._steer_to(self._steering.point_turn())
+        lever = self._steering.lever_m
         top = self._drive.speed_mps / lever
         text = f"turns {math.degrees(angle):.0f} deg on the spot"
         self._notices.append(Notice("point_turn", abs(angle) / top, text))
         rate = 0.0
         while abs(left := wrap_angle(heading_rad - self._pose.yaw_rad)) > _ALIGNED_RAD:
             rate = math.copysign(self._ramp(abs(rate) * lever, abs(left) * lever) / lever, left)
-            speeds = wheel_motion(self._wheels_xy, 0.0, rate)[1]
+            speeds = self._steering.speeds(0.0, rate)
             yield Command(self._steer_rad, speeds / self._radius_m, 0.0, rate)
         yield self._stand()
 
@@ -224,13 +222,13 @@ class Follower:
         length = FEEDBACK_LENGTH_M
         back = -self.cross_track_m / length**2 - 2 * math.sin(error) / length
         wanted = float(leg.curvature[index]) + back
-        wanted = min(max(wanted, -self._max_curvature), self._max_curvature)
-        # The front wheels' angle grows by about 1 rad per 1/m of curvature.
-        step = min(max(wanted - self._curvature, -self._steer_step_rad), self._steer_step_rad)
-        self._curvature += step
+        most = self._steering.max_curvature
+        wanted = min(max(wanted, -most), most)
+        fastest = self._steer_step_rad / self._steering.angle_per_curvature_m
+        self._curvature += min(max(wanted - self._curvature, -fastest), fastest)
 
     def _arc_command(self) -> Command:
         yaw_rate = self._speed_mps * self._curvature
-        self._steer_rad = steering_of_arc(self._wheels_xy, self._curvature)
-        speeds = wheel_motion(self._wheels_xy, self._speed_mps, yaw_rate)[1]
+        self._steer_rad = self._steering.arc(self._curvature)
+        speeds = self._steering.speeds(self._speed_mps, yaw_rate)
         return Command(self._steer_rad, speeds / self._radius_m, self._speed_mps, yaw_rate)

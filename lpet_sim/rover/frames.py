@@ -8,8 +8,10 @@ import numpy as np
 
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import Array
-from lpet_sim.rover.mjcf import WHEELS, bare_model
+from lpet_sim.rover.mjcf import bare_model
+from lpet_sim.rover.model_parts import link_pose
 from lpet_sim.rover.spec import RoverSpec
+from lpet_sim.rover.wheel_parts import wheel_parts
 
 
 @dataclass(frozen=True)
@@ -19,12 +21,13 @@ class RoverFrames:
     Attributes:
         T_body_imu: Pose of the inertial unit.
         T_body_camera: Pose of the left eye (optical: x right, y down, z forward).
-        T_body_camera_right: Pose of the right eye.
+        T_body_camera_right: Pose of the right eye; None where the model does not say it.
         wheel_names: Names of the wheels; their order everywhere.
-        wheel_position_body_m: Centres of the wheels in the body [m], Shape (6, 3).
+        wheel_position_body_m: Centres of the wheels in the body [m], Shape (w, 3).
         wheel_radius_m: Radius of the wheels [m].
         wheel_width_m: Width of the wheels [m].
-        steer_limit_rad: Largest steering angle of each wheel [rad], Shape (6,).
+        steer_limit_rad: Largest steering angle of each wheel, 0 where it does not steer [rad],
+            Shape (w,).
         suspension_joints: Names of the joints of `WheelTruth.joint_angle_rad`, in its order.
         mass_kg: Mass of the whole rover [kg].
         gravity_mps2: Magnitude of gravity in the model [m/s^2].
@@ -32,7 +35,7 @@ class RoverFrames:
 
     T_body_imu: SE3
     T_body_camera: SE3
-    T_body_camera_right: SE3
+    T_body_camera_right: SE3 | None
     wheel_names: tuple[str, ...]
     wheel_position_body_m: Array
     wheel_radius_m: float
@@ -44,7 +47,7 @@ class RoverFrames:
 
     @property
     def contact_body_m(self) -> Array:
-        """Lowest points of the wheels in the body, on flat ground at rest [m], Shape (6, 3)."""
+        """Lowest points of the wheels in the body, on flat ground at rest [m], Shape (w, 3)."""
         return self.wheel_position_body_m - [0.0, 0.0, self.wheel_radius_m]
 
     @property
@@ -62,35 +65,45 @@ def rover_frames(spec: RoverSpec) -> RoverFrames:
     """Read the frames of a rover from its MJCF.
 
     Raises:
-        UnknownNameError: There is no such rover model.
+        UnknownNameError: There is no such rover model, or it lacks what its description names.
+        SpecError: It cannot be read, or is not what a rover needs.
     """
     model = bare_model(spec.model)
-    joints = [model.joint(i).name for i in range(model.njnt)]
+    wheels = wheel_parts(spec.model)
+    tread = model.geom_size[wheels.geom[0]]
+    right = has_site(spec, "camera_right")
     return RoverFrames(
         T_body_imu=site_pose(spec, "imu"),
         T_body_camera=site_pose(spec, "camera"),
-        T_body_camera_right=site_pose(spec, "camera_right"),
-        wheel_names=WHEELS,
-        wheel_position_body_m=np.array([body_pose(spec, f"wheel_{w}").translation for w in WHEELS]),
-        wheel_radius_m=float(model.geom("wheel_front_left").size[0]),
-        wheel_width_m=float(2 * model.geom("wheel_front_left").size[1]),
-        steer_limit_rad=np.array([model.joint(f"steer_{w}").range[1] for w in WHEELS]),
-        suspension_joints=tuple(name for name in joints if name.startswith("bogie_")),
+        T_body_camera_right=site_pose(spec, "camera_right") if right else None,
+        wheel_names=wheels.names,
+        wheel_position_body_m=np.array([_geom_place(spec, geom) for geom in wheels.geom]),
+        wheel_radius_m=float(tread[0]),
+        wheel_width_m=float(2 * tread[1]),
+        steer_limit_rad=np.array([0.0 if j < 0 else model.jnt_range[j, 1] for j in wheels.steer]),
+        suspension_joints=wheels.suspension,
         mass_kg=float(model.body("body").subtreemass[0]),
         gravity_mps2=float(-model.opt.gravity[2]),
     )
 
 
+def _geom_place(spec: RoverSpec, geom: int) -> Array:
+    """Give the middle of a geom in the body [m], Shape (3,)."""
+    model = bare_model(spec.model)
+    owner = model.body(int(model.geom_bodyid[geom])).name
+    return body_pose(spec, owner) @ np.array(model.geom_pos[geom])
+
+
 def body_pose(spec: RoverSpec, name: str) -> SE3:
     """Give ``T_body_link`` of a link of the rover, with every joint at zero."""
     model = bare_model(spec.model)
-    root = model.body("body").id
-    index = model.body(name).id
-    pose = SE3.identity()
-    while index != root:
-        pose = SE3.from_quat_wxyz(model.body_quat[index], model.body_pos[index]) @ pose
-        index = model.body_parentid[index]
-    return pose
+    return link_pose(model, model.body(name).id, model.body("body").id)
+
+
+def has_site(spec: RoverSpec, name: str) -> bool:
+    """Tell whether the rover has a site of that name."""
+    model = bare_model(spec.model)
+    return name in [model.site(k).name for k in range(model.nsite)]
 
 
 def site_pose(spec: RoverSpec, name: str) -> SE3:

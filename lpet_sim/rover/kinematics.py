@@ -1,7 +1,7 @@
-"""Six-wheel steering: wheel angles and speeds for a motion of the body in its own plane.
+"""Steering: wheel angles and speeds for a motion of the body in its own plane.
 
-Every wheel rolls along its own circle about one common centre (double Ackermann steering). Forward
-is x, left is y; a wheel's steering angle is positive to the left.
+Every steered wheel rolls along its own circle about one common centre (double Ackermann steering).
+Forward is x, left is y; a wheel's steering angle is positive to the left.
 """
 
 from __future__ import annotations

@@ -1,53 +1,49 @@
 """Rover models: find them, read them, and compile them together with a piece of ground.
 
-One of the two files of the room that import MuJoCo; the other is `scene`.
+One of the files of the room that import MuJoCo.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from lpet_sim.errors import UnknownNameError
 from lpet_sim.rover.ground import CELL_M, RANGE_M, GroundPatch, RocksLike
+from lpet_sim.rover.model_fit import fitted
+from lpet_sim.rover.model_source import DRAWN_GROUP
+from lpet_sim.rover.model_spec import load_rover_model, wheel_names
 
-WHEELS = ("front_left", "front_right", "middle_left", "middle_right", "rear_left", "rear_right")
 _FLOOR_M = 1.0
 _NET_FORCE = 3  # the contact sensor's reduction of that name
 
 
-def models_folder() -> Path:
-    """Give the folder of the rover models, beside the package in the source tree."""
-    return Path(__file__).resolve().parents[2] / "models"
-
-
-def model_path(name: str) -> Path:
-    """Give the file of a rover model.
+@lru_cache(maxsize=8)
+def rover_source(name: str) -> mujoco.MjSpec:
+    """Give a rover ready to be put on ground; not to be written to.
 
     Args:
-        name: File name without its ending, as in ``exomars``.
+        name: The name of a rover, or the path of its description.
 
     Raises:
-        UnknownNameError: There is no such model.
+        UnknownNameError: There is no such rover, or its description names what its model lacks.
+        SpecError: Its description or its model cannot be read, or is not what a rover needs.
     """
-    valid = sorted(path.stem for path in models_folder().glob("*.xml"))
-    if name not in valid:
-        raise UnknownNameError("rover model", name, valid)
-    return models_folder() / f"{name}.xml"
+    spec = load_rover_model(name)
+    return mujoco.MjSpec.from_file(str(spec.path)) if spec.complete else fitted(spec)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def bare_model(name: str) -> mujoco.MjModel:
-    """Compile a rover by itself, without any ground; not to be written to."""
-    return mujoco.MjModel.from_xml_path(str(model_path(name)))
+    """Compile a rover by itself, without any ground; not to be written to.
 
-
-@lru_cache(maxsize=4)
-def _source(name: str) -> str:
-    return model_path(name).read_text()
+    Raises:
+        UnknownNameError: As `rover_source`.
+        SpecError: As `rover_source`.
+    """
+    return rover_source(name).copy().compile()
 
 
 def compile_on(name: str, dt_s: float, patch: GroundPatch, rocks: RocksLike) -> mujoco.MjModel:
@@ -63,17 +59,22 @@ def compile_on(name: str, dt_s: float, patch: GroundPatch, rocks: RocksLike) -> 
         patch: The ground.
         rocks: Convex rocks, each a geom of its own.
     """
-    spec = mujoco.MjSpec.from_string(_source(name))
+    model = spec_on(name, dt_s, patch, rocks).compile()
+    model.hfield_data[:] = patch.data.ravel()
+    return model
+
+
+def spec_on(name: str, dt_s: float, patch: GroundPatch, rocks: RocksLike) -> mujoco.MjSpec:
+    """Put a rover and ground together as `compile_on` does, not yet compiled, without heights."""
+    spec = rover_source(name).copy()
     spec.option.timestep = dt_s
     _add_ground(spec, patch)
     for k in range(len(rocks.id)):
         _add_rock(spec, rocks, k)
-    for wheel in WHEELS:
+    for wheel in wheel_names(name):
         _add_contact_sensor(spec, f"load_{wheel}", wheel, None)
         _add_contact_sensor(spec, f"soil_{wheel}", wheel, "ground")
-    model = spec.compile()
-    model.hfield_data[:] = patch.data.ravel()
-    return model
+    return spec
 
 
 def _add_contact_sensor(spec: mujoco.MjSpec, name: str, wheel: str, ground: str | None) -> None:
@@ -134,17 +135,31 @@ def _add_rock(spec: mujoco.MjSpec, rocks: RocksLike, k: int) -> None:
     )
 
 
-VISUAL_GROUP = 1  # group of the geoms that are drawn; those that collide are in group 3
+VISUAL_GROUP = DRAWN_GROUP
+"""Group of the geoms that are drawn; those that collide are in group 3."""
+
+_KINDS = {
+    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "ellipsoid",
+    int(mujoco.mjtGeom.mjGEOM_MESH): "mesh",
+}
 
 
 def geom_kind(model: mujoco.MjModel, geom: int) -> str:
-    """Give the kind of a drawn geom: ``box`` or ``cylinder``, the only two that models use.
+    """Give the kind of a drawn geom: box, cylinder, capsule, sphere, ellipsoid or mesh.
 
     Raises:
         UnknownNameError: It is of another kind.
     """
-    kinds = {int(mujoco.mjtGeom.mjGEOM_BOX): "box", int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder"}
     kind = int(model.geom_type[geom])
-    if kind not in kinds:
-        raise UnknownNameError("kind of drawn geom", str(kind), kinds.values())
-    return kinds[kind]
+    if kind not in _KINDS:
+        raise UnknownNameError("kind of drawn geom", str(kind), _KINDS.values())
+    return _KINDS[kind]
+
+
+def is_hinge(model: mujoco.MjModel, joint: int) -> bool:
+    """Tell whether a joint turns about one axis."""
+    return int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_HINGE)

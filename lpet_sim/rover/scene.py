@@ -12,18 +12,18 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from lpet_sim.errors import PlanningError
-from lpet_sim.geometry import SE3
+from lpet_sim.geometry import SE3, so3
 from lpet_sim.recording.arrays import Array
 from lpet_sim.recording.truth import CONTACT_NONE, CONTACT_ROCK, CONTACT_SOIL
+from lpet_sim.rover.drivable import check_drivable, reach_of
 from lpet_sim.rover.frames import RoverFrames, rover_frames
 from lpet_sim.rover.ground import Ground, cut_patch
-from lpet_sim.rover.mjcf import WHEELS, compile_on
+from lpet_sim.rover.mjcf import compile_on
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.rover.wheel_contact import WheelContact, WheelIndex, law_on
+from lpet_sim.rover.wheel_parts import WheelParts, parts_of
 from lpet_sim.rover.wheel_soil import WheelSoilLaw, WheelState
 
-_REACH_M = 1.25  # farthest part of a wheel from the body's origin, with room to spare
 _ROCK_MARGIN_M = 1.0  # rocks are found by their centre; the largest reach this far
 _LIFT_STEP_M = 0.01
 # Sweeps that take creep out of contacts: to hold slip to half a point, and to park for hours.
@@ -46,9 +46,11 @@ class Scene:
         self.ground = ground
         self.spec = spec
         self.frames: RoverFrames = rover_frames(spec)
-        radius_m, share_kg = self.frames.wheel_radius_m, self.frames.mass_kg / len(WHEELS)
-        dt_s = spec.physics_dt_s
-        self.contact = WheelContact(law, spec.wheel_soil, radius_m, share_kg, dt_s)
+        self._count = len(self.frames.wheel_names)
+        share_kg = self.frames.mass_kg / self._count
+        sizes = (self._count, self.frames.wheel_radius_m, share_kg)
+        self.contact = WheelContact(law, spec.wheel_soil, *sizes, spec.physics_dt_s)
+        self._reach_m = reach_of(self.frames)
         self.patch_changes = 0
         self.step_count = 0
         self._held = False
@@ -72,7 +74,7 @@ class Scene:
 
     @property
     def sinkage_m(self) -> Array:
-        """How deep each wheel stands in the soil [m], Shape (6,)."""
+        """How deep each wheel stands in the soil [m], Shape (w,)."""
         return self.contact.motion[2].copy()
 
     @property
@@ -82,6 +84,8 @@ class Scene:
         Of each contact the first row of the constraint force is the normal one. Just after the
         ground was cut anew there are no contacts yet: ask before `follow`.
         """
+        if self._belly_geom is None:
+            return 0.0
         contact = self.data.contact
         rows = contact.efc_address[(contact.geom == self._belly_geom).any(axis=1)]
         return float(self.data.efc_force[rows[rows >= 0]].sum())
@@ -92,7 +96,7 @@ class Scene:
         R_flat = SE3.from_rpy([0.0, 0.0, yaw_rad], [*xy, 0.0])
         wheel = R_flat @ self.frames.contact_body_m
         height = self.ground.height(wheel[:, :2])
-        plane = np.c_[wheel[:, :2] - xy, np.ones(6)]
+        plane = np.c_[wheel[:, :2] - xy, np.ones(self._count)]
         slope_x, slope_y, level = np.linalg.lstsq(plane, height, rcond=None)[0]
         pose = SE3(_facing(slope_x, slope_y, yaw_rad), np.zeros(3))
         centre = np.array([*xy, level])
@@ -113,7 +117,7 @@ class Scene:
             mujoco.mj_forward(self.model, self.data)
 
     def command(self, steer_rad: Array, rate_radps: Array) -> None:
-        """Set the steering angles [rad] and wheel rates [rad/s], Shape (6,) each.
+        """Set the steering angles [rad] and wheel rates [rad/s], Shape (w,) each.
 
         The drives integrate their rate to an angle, which lets them brake without creep. A wheel
         that stalls must not save up a turn for later: the angle is kept within the motor's reach.
@@ -121,7 +125,7 @@ class Scene:
         lag = self._drive_lag_s * self._qvel[self._drive_dof]
         angle = self._qpos[self._drive_qpos] + lag
         self._act[:] = np.clip(self._act, angle - self._drive_reach, angle + self._drive_reach)
-        self._ctrl[self._steer_act] = steer_rad
+        self._ctrl[self._parts.steer_act] = steer_rad[self._steered]
         self._ctrl[self._drive_act] = rate_radps
         driving = np.any(rate_radps)
         self.model.opt.noslip_iterations = _SWEEPS_DRIVING if driving else _SWEEPS_PARKED
@@ -153,7 +157,7 @@ class Scene:
     def follow(self) -> None:
         """Cut the ground anew around the rover when it nears the edge of its patch."""
         away = np.abs(self.xy - self.model.geom("ground").pos[:2]).max()
-        if away > self.spec.patch_m / 2 - _REACH_M:
+        if away > self.spec.patch_m / 2 - self._reach_m:
             self.recentre()
 
     def recentre(self) -> None:
@@ -181,59 +185,66 @@ class Scene:
         model.opt.noslip_iterations = self.model.opt.noslip_iterations
         for name in ("sensordata", "xpos", "xquat", "qfrc_constraint"):
             getattr(data, name)[:] = getattr(self.data, name)
-        for wheel in WHEELS:
-            mine = self.model.geom(f"wheel_{wheel}").id
-            theirs = model.geom(f"wheel_{wheel}").id
-            for name in ("geom_surfacevel", "geom_friction"):
-                getattr(model, name)[theirs] = getattr(self.model, name)[mine]
-            data.geom_xmat[theirs] = self.data.geom_xmat[mine]
+        mine, theirs = self._parts.geom, parts_of(model, self.frames.wheel_names).geom
+        for name in ("geom_surfacevel", "geom_friction"):
+            getattr(model, name)[theirs] = getattr(self.model, name)[mine]
+        for name in ("geom_xmat", "geom_xpos"):
+            getattr(data, name)[theirs] = getattr(self.data, name)[mine]
 
     def _bind(self) -> None:
         """Keep views of MuJoCo's arrays: looking them up at every step would cost more."""
         model, data = self.model, self.data
+        self._parts: WheelParts = parts_of(model, self.frames.wheel_names)
         self._qpos, self._qvel, self._ctrl, self._act = data.qpos, data.qvel, data.ctrl, data.act
-        self._belly_geom = model.geom("belly").id
-        self._wheel_body = self._ids("body", "wheel_")
-        self._leg_body = self._ids("body", "leg_")
-        self._drive_act = self._ids("actuator", "drive_")
-        self._steer_act = self._ids("actuator", "steer_")
+        belly = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "belly")
+        self._belly_geom = belly if belly >= 0 else None
+        self._drive_act = self._parts.drive_act
         limit = model.actuator_forcerange[self._drive_act, 1]
         self._drive_reach = limit / model.actuator_gainprm[self._drive_act, 0]
         damping = model.actuator_biasprm[self._drive_act]
         self._drive_lag_s = damping[:, 2] / damping[:, 1]
-        self._drive_dof = np.array([model.joint(f"drive_{w}").dofadr[0] for w in WHEELS])
-        self._drive_qpos = np.array([model.joint(f"drive_{w}").qposadr[0] for w in WHEELS])
-        self._steer_qpos = np.array([model.joint(f"steer_{w}").qposadr[0] for w in WHEELS])
-        joints = self.frames.suspension_joints
-        self._suspension_qpos = np.array([model.joint(j).qposadr[0] for j in joints])
-        start = model.sensor("load_front_left").adr[0]
-        self._contacts = data.sensordata[start : start + 30].reshape(6, 5)
-        at = np.stack([self._ids("geom", "wheel_"), self._wheel_body, self._drive_dof])
-        self.contact.bind(model, data, WheelIndex(at, int(start)))
-
-    def _ids(self, kind: str, prefix: str) -> NDArray[np.int64]:
-        look_up = getattr(self.model, kind)
-        return np.array([look_up(prefix + wheel).id for wheel in WHEELS])
+        self._steered = self._parts.steered
+        self._drive_dof = model.jnt_dofadr[self._parts.drive].astype(np.int64)
+        self._drive_qpos = model.jnt_qposadr[self._parts.drive].astype(np.int64)
+        self._steer_qpos = model.jnt_qposadr[self._parts.steer[self._steered]].astype(np.int64)
+        joints = [model.joint(name).id for name in self._parts.suspension]
+        self._suspension_qpos = model.jnt_qposadr[np.array(joints, dtype=np.int64)]
+        start = int(model.sensor(f"load_{self.frames.wheel_names[0]}").adr[0])
+        width = 5 * self._count
+        self._contacts = data.sensordata[start : start + width].reshape(-1, 5)
+        at = np.stack([self._parts.geom, self._parts.body, self._drive_dof])
+        self.contact.bind(model, data, WheelIndex(at, start))
 
     def body_row(self) -> Array:
         """Give position, quaternion, velocity in the world and body rate, Shape (13,)."""
         return np.concatenate([self._qpos[:7], self._qvel[:6]])
 
     def wheel_row(self) -> Array:
-        """Give the wheels' and joints' state as one row, for `truth_log`, Shape (78 + j,)."""
+        """Give the wheels' and joints' state as one row, for `truth_log`, Shape (13 w + j,)."""
         return np.concatenate(
             [
                 self._qpos[self._drive_qpos],
-                self._qpos[self._steer_qpos],
+                self._steer_angle(),
                 self.contact.read()[2],
                 self._contact_kinds(),
-                self.data.xpos[self._wheel_body].ravel(),
-                self.data.xquat[self._leg_body].ravel(),
+                self.data.geom_xpos[self._parts.geom].ravel(),
+                self._leg_quat().ravel(),
                 self.contact.force[0],
                 self.sinkage_m,
                 self._qpos[self._suspension_qpos],
             ]
         )
+
+    def _steer_angle(self) -> Array:
+        angle = np.zeros(self._count)
+        angle[self._steered] = self._qpos[self._steer_qpos]
+        return angle
+
+    def _leg_quat(self) -> Array:
+        """Give how the legs stand, with the body's axes where they have others, Shape (w, 4)."""
+        quat = self.data.xquat[self._parts.leg]
+        ahead = self._parts.R_leg_ahead
+        return quat if ahead is None else so3.to_quat_wxyz(so3.from_quat_wxyz(quat) @ ahead)
 
     def _contact_kinds(self) -> NDArray[np.uint8]:
         found, soil = self._contacts[:, 0], self._contacts[:, 4]
@@ -271,27 +282,8 @@ def build_scene(
         UnknownNameError: There is no such rover model.
         PlanningError: The start lies outside the drivable ground.
     """
-    check_drivable(ground, np.array([start_xy_m], dtype=float))
+    xy = np.array([start_xy_m], dtype=float)
+    check_drivable(ground, xy, reach_of(rover_frames(spec)))
     scene = Scene(ground, spec, law or law_on(ground, spec))
     scene.place(np.asarray(start_xy_m, dtype=float), start_yaw_rad)
     return scene
-
-
-def check_drivable(ground: Ground, xy: Array) -> None:
-    """Hold points to lie on drivable ground, with the rover's reach to spare.
-
-    Raises:
-        PlanningError: A point, Shape (n, 2), lies outside.
-    """
-    box = ground.drivable
-    if box is None:
-        return
-    low = np.array([box.x_min, box.y_min]) + _REACH_M
-    high = np.array([box.x_max, box.y_max]) - _REACH_M
-    outside = np.any((xy < low) | (xy > high), axis=1)
-    if outside.any():
-        x, y = xy[outside][0]
-        raise PlanningError(
-            f"({x:.1f}, {y:.1f}) m lies outside the drivable ground: x from {low[0]:.1f} to "
-            f"{high[0]:.1f}, y from {low[1]:.1f} to {high[1]:.1f} m"
-        )

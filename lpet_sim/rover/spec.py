@@ -14,19 +14,17 @@ from lpet_sim.spec import Spec
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 MARS_100_M_PER_H_MPS = 100.0 / 3600.0
-WheelName = Literal[
-    "front_left", "front_right", "middle_left", "middle_right", "rear_left", "rear_right"
-]
 Failure = Literal["tipped", "entrapped", "hung_up", "stuck", "sliding"]
 
 
 class RoverSpec(Spec):
     """Which rover, and how finely the ground under it is resolved.
 
-    Masses, lengths and frames are the MJCF's; ``models/README.md`` has their sources.
+    Masses, lengths and frames are the model's; ``models/README.md`` has the sources of ours.
 
     Attributes:
-        model: Name of a file in ``models/``, without its ending.
+        model: Name of a description in ``models/``, without its ending, or the path of the YAML
+            that describes a rover of one's own (``docs/own_rover.md``).
         physics_dt_s: Physics step; 5 ms holds the slip law to 0.3 points (measured).
         patch_m: Side of the square of ground that is loaded around the rover.
         rock_min_diameter_m: Smaller rocks are pressed into the soil and not collided with
@@ -71,12 +69,12 @@ class StuckWheel(Spec):
     """A wheel whose drive is locked: it still steers, and is dragged by the others.
 
     Attributes:
-        wheel: Which wheel.
+        wheel: Which wheel, by its name in the rover's description.
         start_s: When it begins, since the start.
         duration_s: How long it lasts; None for as long as the drive.
     """
 
-    wheel: WheelName
+    wheel: str
     start_s: NotNegative
     duration_s: Positive | None = None
 

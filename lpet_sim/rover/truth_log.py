@@ -19,10 +19,15 @@ class TruthLog:
         events: What happened since the last chunk.
     """
 
-    def __init__(self, wheel_radius_m: float) -> None:
-        """Start with nothing."""
+    def __init__(self, wheel_radius_m: float, wheels: int) -> None:
+        """Start with nothing.
+
+        Args:
+            wheel_radius_m: Radius of the wheels.
+            wheels: Number of wheels.
+        """
         self.events: list[Event] = []
-        self._radius_m = wheel_radius_m
+        self._radius_m, self._count = wheel_radius_m, wheels
         self._body: list[Array] = []
         self._wheels: list[Array] = []
         self._body_t_ns: list[int] = []
@@ -61,22 +66,34 @@ class TruthLog:
         rows = np.array(self._wheels)
         before = rows[:1] if self._wheel_before is None else self._wheel_before[None]
         self._wheel_before = rows[-1]
-        slip, slip_angle = slip_between(np.concatenate([before, rows]), self._radius_m)
+        slip, slip_angle = slip_between(np.concatenate([before, rows]), self._radius_m, self._count)
+        at = row_columns(self._count)
         return WheelTruth(
             t_ns=np.array(self._wheel_t_ns, dtype=np.int64),
-            drive_angle_rad=rows[:, :6].copy(),
-            steer_angle_rad=rows[:, 6:12].copy(),
+            drive_angle_rad=rows[:, at["drive"]].copy(),
+            steer_angle_rad=rows[:, at["steer"]].copy(),
             slip=slip,
-            load_n=rows[:, 12:18].copy(),
-            traction_n=rows[:, 66:72].copy(),
-            sinkage_m=rows[:, 72:78].copy(),
+            load_n=rows[:, at["load"]].copy(),
+            traction_n=rows[:, at["traction"]].copy(),
+            sinkage_m=rows[:, at["sinkage"]].copy(),
             slip_angle_rad=slip_angle,
-            contact=rows[:, 18:24].astype(np.uint8),
-            joint_angle_rad=rows[:, 78:].copy(),
+            contact=rows[:, at["contact"]].astype(np.uint8),
+            joint_angle_rad=rows[:, at["joints"]].copy(),
         )
 
 
-def slip_between(rows: Array, radius_m: float) -> tuple[Array, Array]:
+def row_columns(wheels: int) -> dict[str, slice]:
+    """Give where the parts of `Scene.wheel_row` stand, for so many wheels."""
+    widths = {"drive": 1, "steer": 1, "load": 1, "contact": 1, "centre": 3, "leg": 4}
+    widths |= {"traction": 1, "sinkage": 1}
+    ends = np.cumsum([0, *widths.values()]) * wheels
+    found = {
+        name: slice(int(a), int(b)) for name, a, b in zip(widths, ends, ends[1:], strict=False)
+    }
+    return found | {"joints": slice(int(ends[-1]), None)}
+
+
+def slip_between(rows: Array, radius_m: float, wheels: int) -> tuple[Array, Array]:
     """Give the mean slip and slip angle of each wheel from each sample to the next.
 
     ``s = 1 - v / (r omega)``: v is how far the wheel's centre moved across its axle, and r omega
@@ -85,18 +102,19 @@ def slip_between(rows: Array, radius_m: float) -> tuple[Array, Array]:
     taken as high as it would stand on the surface. The slip angle is ``atan2(left, |v|)``.
 
     Args:
-        rows: Rows of `Scene.wheel_row`, Shape (n + 1, 78 + j).
+        rows: Rows of `Scene.wheel_row`, Shape (n + 1, 13 w + j).
         radius_m: Radius of the wheels [m].
+        wheels: Number of wheels w.
 
     Returns:
-        Slip and slip angle [rad], Shape (n, 6) each.
+        Slip and slip angle [rad], Shape (n, w) each.
     """
-    n = len(rows)
-    centre = rows[:, 24:42].reshape(n, 6, 3).copy()
-    centre[..., 2] += rows[:, 72:78]
-    R_world_leg = so3.from_quat_wxyz(rows[:, 42:66].reshape(n, 6, 4))
+    n, at = len(rows), row_columns(wheels)
+    centre = rows[:, at["centre"]].reshape(n, wheels, 3).copy()
+    centre[..., 2] += rows[:, at["sinkage"]]
+    R_world_leg = so3.from_quat_wxyz(rows[:, at["leg"]].reshape(n, wheels, 4))
     turn_in_leg = so3.log(np.swapaxes(R_world_leg[:-1], -1, -2) @ R_world_leg[1:])
-    turned = np.diff(rows[:, :6], axis=0) + turn_in_leg[..., 1]
+    turned = np.diff(rows[:, at["drive"]], axis=0) + turn_in_leg[..., 1]
     moved_in_leg = np.einsum("nwji,nwj->nwi", R_world_leg[:-1], np.diff(centre, axis=0))
     moved = np.hypot(moved_in_leg[..., 0], moved_in_leg[..., 2])
     moved = np.copysign(moved, moved_in_leg[..., 0])

@@ -32,7 +32,7 @@ class WheelIndex:
     """Where a model keeps its wheels.
 
     Attributes:
-        at: Geoms, bodies and joint rates, Shape (3, 6).
+        at: Geoms, bodies and joint rates, Shape (3, w).
         contacts: Where the contact sensors begin in `sensordata`.
     """
 
@@ -41,35 +41,36 @@ class WheelIndex:
 
 
 class WheelContact:
-    """Six wheels on the ground, whatever model of it is loaded.
+    """The wheels on the ground, whatever model of it is loaded.
 
     Attributes:
         law: The wheel-soil law.
         force: Forces of the ground on the wheels, forward, to the left and normal [N], and their
-            rates [rad/s], Shape (4, 6).
+            rates [rad/s], Shape (4, w).
         wheels: What the law was told last.
         response: What it answered.
-        motion: Slip, side creep and depth [m] of the wheels as they are, Shape (3, 6).
-        normal: Normal of the ground under each wheel, Shape (6, 3).
+        motion: Slip, side creep and depth [m] of the wheels as they are, Shape (3, w).
+        normal: Normal of the ground under each wheel, Shape (w, 3).
     """
 
     def __init__(
         self,
         law: WheelSoilLaw,
         spec: WheelSoilSpec,
+        count: int,
         radius_m: float,
         share_kg: float,
         dt_s: float,
     ) -> None:
         """Start with wheels that stand on the surface; `bind` gives them a model."""
         self.law = law
-        self.wheels = WheelState()
-        self.response = WheelResponse()
-        self.motion = np.zeros((3, 6))
-        self.normal = np.tile([0.0, 0.0, 1.0], (6, 1))
-        self.force = np.zeros((4, 6))
-        self._mean = np.zeros((4, 6))
-        self._arm = np.full(6, radius_m)
+        self.wheels = WheelState.of(count)
+        self.response = WheelResponse.of(count)
+        self.motion = np.zeros((3, count))
+        self.normal = np.tile([0.0, 0.0, 1.0], (count, 1))
+        self.force = np.zeros((4, count))
+        self._mean = np.zeros((4, count))
+        self._arm = np.full(count, radius_m)
         self._radius_m = radius_m
         self._looked = 0
         self._looks_every = max(1, round(_LOOK_S / dt_s))
@@ -102,9 +103,9 @@ class WheelContact:
         stand = self._radius_m - self._pace[5] * self.motion[2]
         model.geom_size[index.at[0], 0], self._arm[:] = stand - margin, stand - margin / 2
         at, wheels, answer = index.at, self.wheels, self.response
-        contacts = data.sensordata[index.contacts : index.contacts + 30].reshape(6, 5)
-        self._position = data.xpos
-        self._body = at[1]
+        contacts = data.sensordata[index.contacts : index.contacts + 5 * at.shape[1]].reshape(-1, 5)
+        self._position = data.geom_xpos
+        self._geom = at[0]
         self._read = (
             *(contacts, data.geom_xmat, data.qfrc_constraint, data.qvel, at),
             *(self.normal, self._arm, self.force, wheels.on_rock),
@@ -123,7 +124,7 @@ class WheelContact:
         )
 
     def read(self) -> Array:
-        """Read the forces of the last step, Shape (4, 6)."""
+        """Read the forces of the last step, Shape (4, w)."""
         read_wheels(*self._read)
         return self.force
 
@@ -145,12 +146,12 @@ class WheelContact:
     def look_under(self, ground: Ground) -> None:
         """Look up which soil is under each wheel, and how the ground leans there."""
         self._looked = 0
-        xy = self._position[self._body, :2]
+        xy = self._position[self._geom, :2]
         self.wheels.soil[:] = ground.soil(xy)
         reach = self._radius_m / 2  # about the footprint
         around = (xy[:, None] + reach * _CROSS).reshape(-1, 2)
-        east, west, north, south = ground.height(around).reshape(6, 4).T
-        lean = np.stack([west - east, south - north, np.full(6, 2 * reach)], axis=1)
+        east, west, north, south = ground.height(around).reshape(-1, 4).T
+        lean = np.stack([west - east, south - north, np.full(len(xy), 2 * reach)], axis=1)
         self.normal[:] = lean / np.linalg.norm(lean, axis=1, keepdims=True)
 
 

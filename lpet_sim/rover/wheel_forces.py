@@ -44,18 +44,18 @@ def read_wheels(
 
     Args:
         contacts: Contacts with anything, net force on the ground in the world [N], contacts with
-            soil, Shape (6, 5).
+            soil, Shape (w, 5).
         geom_xmat: Rotations of all geoms, row-major, Shape (g, 9); a wheel's axle is its z.
         qfrc_constraint: Constraint torques [N m], Shape (nv,).
         qvel: Joint rates, Shape (nv,).
-        index: Geoms, bodies and joint rates of the wheels, Shape (3, 6).
-        normal: Normal of the ground under each wheel, Shape (6, 3).
-        arm: Distance from each axle to the contact [m], Shape (6,).
+        index: Geoms, bodies and joint rates of the wheels, Shape (3, w).
+        normal: Normal of the ground under each wheel, Shape (w, 3).
+        arm: Distance from each axle to the contact [m], Shape (w,).
         force: Out: forward, to the left and normal on the wheels [N], and their rates [rad/s],
-            Shape (4, 6).
-        on_rock: Out, Shape (6,).
+            Shape (4, w).
+        on_rock: Out, Shape (w,).
     """
-    for i in range(6):
+    for i in range(len(arm)):
         geom, dof = index[GEOM, i], index[DOF, i]
         on_rock[i] = contacts[i, 0] > contacts[i, 4]
         traction = -qfrc_constraint[dof] / arm[i]
@@ -87,18 +87,18 @@ def follow_forces(
     is that of an implicit one, ``g / (1 + g k B)``: the same end, no chatter.
 
     Args:
-        force: Forces and rates of the wheels as `read_wheels` gives them, Shape (4, 6).
+        force: Forces and rates of the wheels as `read_wheels` gives them, Shape (4, w).
         pace: See `move_wheels`.
-        slip_steepness: The law's last, Shape (6,).
-        side_steepness: The law's last, Shape (6,).
-        mean: Means of forces and rates, Shape (4, 6), kept here.
-        traction_n: Out: mean force along the rolling, Shape (6,).
-        side_n: Out: mean force to the left, Shape (6,).
-        load_n: Out: mean normal force, Shape (6,).
-        omega_radps: Out: mean rate, Shape (6,).
+        slip_steepness: The law's last, Shape (w,).
+        side_steepness: The law's last, Shape (w,).
+        mean: Means of forces and rates, Shape (4, w), kept here.
+        traction_n: Out: mean force along the rolling, Shape (w,).
+        side_n: Out: mean force to the left, Shape (w,).
+        load_n: Out: mean normal force, Shape (w,).
+        omega_radps: Out: mean rate, Shape (w,).
     """
     gain, side_gain, radius, mass = pace[1], pace[2], pace[4], pace[6]
-    for i in range(6):
+    for i in range(mean.shape[1]):
         answer = mass * radius * abs(mean[3, i]) / max(mean[2, i], _AIRBORNE_N)
         share = gain / (1.0 + gain * answer * _ALONG_PER_S * slip_steepness[i])
         side_share = side_gain / (1.0 + side_gain * answer * _ACROSS_PER_S * side_steepness[i])
@@ -155,7 +155,7 @@ def move_wheels(
         M - T (r - z) - N dz / (|omega| dt),  M no less than T r (1 - slip): no energy is made
 
     Args:
-        index: Geoms, bodies and joint rates of the wheels, Shape (3, 6).
+        index: Geoms, bodies and joint rates of the wheels, Shape (3, w).
         geom_xmat: Rotations of all geoms, Shape (g, 9).
         surfacevel: Surface velocities of all geoms, Shape (g, 6).
         geom_size: Sizes of all geoms [m], Shape (g, 3).
@@ -165,18 +165,18 @@ def move_wheels(
             follows [m], radius [m], 1 where wheels stand as deep as they sink, else 0, a
             wheel's share of the mass [kg], and the gap at which contacts hold the wheels [m].
         held: Whether surfaces are to stand still, as in a forced slip.
-        force: Forces and rates of the wheels, Shape (4, 6).
-        mean: Their means, Shape (4, 6).
-        slip: The law's, Shape (6,).
-        side_creep: The law's, Shape (6,).
-        sinkage_m: The law's, Shape (6,).
-        torque_nm: The law's, Shape (6,).
-        friction: The law's, Shape (6,).
-        motion: Slip, side creep and depth [m] as they are, Shape (3, 6); kept here.
-        arm: Out: distance from each axle to the contact [m], Shape (6,).
+        force: Forces and rates of the wheels, Shape (4, w).
+        mean: Their means, Shape (4, w).
+        slip: The law's, Shape (w,).
+        side_creep: The law's, Shape (w,).
+        sinkage_m: The law's, Shape (w,).
+        torque_nm: The law's, Shape (w,).
+        friction: The law's, Shape (w,).
+        motion: Slip, side creep and depth [m] as they are, Shape (3, w); kept here.
+        arm: Out: distance from each axle to the contact [m], Shape (w,).
     """
     dt, gain, side_gain, length, radius, sinks, _, margin = pace
-    for i in range(6):
+    for i in range(len(arm)):
         geom, body = index[GEOM, i], index[BODY, i]
         omega, turning = force[3, i], abs(mean[3, i])
         motion[0, i] += _held(1.0 if held else slip[i], motion[0, i], gain)

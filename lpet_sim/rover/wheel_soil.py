@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Protocol
 
@@ -48,13 +48,9 @@ _MIN_LOAD_N = 1.0
 _NODES_PER_LOG = (LOAD_NODES - 1) / (2 * math.log(LOAD_SPAN))
 
 
-def _six() -> Array:
-    return np.zeros(6)
-
-
 @dataclass
 class WheelState:
-    """What the law is told of the wheels, in their usual order; every array has Shape (6,).
+    """What the law is told of the wheels, in their usual order; every array has Shape (w,).
 
     Attributes:
         traction_n: Force of the ground along the wheel's rolling, positive where it drives the
@@ -66,17 +62,24 @@ class WheelState:
         on_rock: Whether the wheel touches a rock.
     """
 
-    traction_n: Array = field(default_factory=_six)
-    side_n: Array = field(default_factory=_six)
-    load_n: Array = field(default_factory=_six)
-    omega_radps: Array = field(default_factory=_six)
-    soil: Ints = field(default_factory=lambda: np.zeros(6, dtype=np.int64))
-    on_rock: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(6, dtype=np.bool_))
+    traction_n: Array
+    side_n: Array
+    load_n: Array
+    omega_radps: Array
+    soil: Ints
+    on_rock: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, wheels: int) -> WheelState:
+        """Make the state of so many wheels without load or motion, on the first soil."""
+        traction, side, load, omega = np.zeros((4, wheels))
+        soil, on_rock = np.zeros(wheels, dtype=np.int64), np.zeros(wheels, dtype=np.bool_)
+        return cls(traction, side, load, omega, soil, on_rock)
 
 
 @dataclass
 class WheelResponse:
-    """What the law answers; it writes into these arrays, every one of Shape (6,).
+    """What the law answers; it writes into these arrays, every one of Shape (w,).
 
     The scene lets the motion follow `slip` and `side_creep` in time, and the depth follow
     `sinkage_m` with the distance rolled.
@@ -93,13 +96,19 @@ class WheelResponse:
         side_steepness: The same of the creep with side force over load.
     """
 
-    slip: Array = field(default_factory=_six)
-    side_creep: Array = field(default_factory=_six)
-    sinkage_m: Array = field(default_factory=_six)
-    torque_nm: Array = field(default_factory=_six)
-    friction: Array = field(default_factory=lambda: np.full(6, 0.9))
-    slip_steepness: Array = field(default_factory=lambda: np.full(6, 5.0))
-    side_steepness: Array = field(default_factory=lambda: np.full(6, 5.0))
+    slip: Array
+    side_creep: Array
+    sinkage_m: Array
+    torque_nm: Array
+    friction: Array
+    slip_steepness: Array
+    side_steepness: Array
+
+    @classmethod
+    def of(cls, wheels: int) -> WheelResponse:
+        """Make room for the answer for so many wheels."""
+        values = (0.0, 0.0, 0.0, 0.0, 0.9, 5.0, 5.0)
+        return cls(*(np.full(wheels, value) for value in values))
 
 
 class WheelSoilLaw(Protocol):
@@ -244,7 +253,7 @@ def _look_up(
     side_steepness: Array,
 ) -> None:
     found = np.empty(6)
-    for i in range(6):
+    for i in range(len(load_n)):
         load = max(load_n[i], _MIN_LOAD_N)
         standing = abs(omega_radps[i]) < STANDING_RADPS
         x = 0.0 if standing else traction_n[i] / load

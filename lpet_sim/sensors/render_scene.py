@@ -7,10 +7,8 @@ one channel, which is faster here than 8 bits in three and leaves the quantising
 
 from __future__ import annotations
 
-import importlib
 import os
 from collections.abc import Sequence
-from typing import Any
 
 os.environ.setdefault("PYOPENGL_PLATFORM", os.environ.get("MUJOCO_GL", "egl"))
 
@@ -19,15 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 from OpenGL import GL  # type: ignore[import-untyped]
 
-from lpet_sim.errors import UnknownNameError
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import Array
+from lpet_sim.rover.picture import offscreen_context
 from lpet_sim.sensors.render_layout import Eye, MeshLayout
 
 NEAR_M = 0.05
 FAR_M = 40_000.0
 _HIDDEN, _SHOWN = 5, 0
-_CONTEXTS = ("egl", "glfw", "osmesa")
 _OPTICAL_TO_GL = np.diag([1.0, -1.0, -1.0])
 
 
@@ -90,7 +87,7 @@ class RenderScene:
 
     def _open(self) -> None:
         """Make the context, and give its textures and buffer 16 bits."""
-        self._gl = _make_context(self._width, self._height)
+        self._gl = offscreen_context(self._width, self._height)
         self._gl.make_current()
         self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
@@ -220,14 +217,6 @@ class RenderScene:
             self._context.free()
             self._gl.free()
             self._gl = None
-
-
-def _make_context(width_px: int, height_px: int) -> Any:
-    """Make an offscreen context by the way that MUJOCO_GL names; egl where it is not set."""
-    way = os.environ.get("MUJOCO_GL", "egl").lower()
-    if way not in _CONTEXTS:
-        raise UnknownNameError("value of MUJOCO_GL", way, _CONTEXTS)
-    return importlib.import_module(f"mujoco.{way}").GLContext(width_px, height_px)
 
 
 def _add_texture(spec: mujoco.MjSpec, index: int) -> None:

@@ -92,15 +92,23 @@ class WheelOdometrySpec(Spec):
 class WheelEncoders:
     """The encoders on one traverse: fed chunk by chunk, equal to the bit however cut."""
 
-    def __init__(self, spec: WheelOdometrySpec, wheels: int, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        spec: WheelOdometrySpec,
+        wheels: int,
+        rng: np.random.Generator,
+        steerable: tuple[bool, ...] | None = None,
+    ) -> None:
         """Draw the errors that stay for the traverse.
 
         Args:
             spec: The encoders.
             wheels: Number of wheels.
             rng: Their own random stream.
+            steerable: Which wheels steer, and so have an encoder there; None for all of them.
         """
         self._spec = spec
+        self._steers = np.array((True,) * wheels if steerable is None else steerable)
         self._rng = rng
         common = spec.scale_common_sigma * rng.standard_normal()
         self._scale = 1.0 + common + spec.scale_wheel_sigma * rng.standard_normal(wheels)
@@ -117,7 +125,8 @@ class WheelEncoders:
         """Read the encoders at every time of one chunk of the truth.
 
         ``drive = scale theta + wander + white`` and ``steer = delta + bias + white``, each rounded
-        to its resolution; the wander's variance grows with the angle turned.
+        to its resolution, and 0 where there is no steering; the wander's variance grows with the
+        angle turned.
         """
         spec = self._spec
         # One row of numbers per reading: chunks make no difference.
@@ -128,7 +137,7 @@ class WheelEncoders:
         return WheelStream(
             np.array(truth.t_ns),
             _quantised(drive, spec.drive_resolution_rad),
-            _quantised(steer, spec.steer_resolution_rad),
+            np.where(self._steers, _quantised(steer, spec.steer_resolution_rad), 0.0),
         )
 
     def _wandered(self, truth: WheelTruth, normals: Array) -> Array:

@@ -12,7 +12,8 @@ from lpet_sim.recording.arrays import NS_PER_S, Array
 from lpet_sim.recording.scene import DrawnLink, Mesh, join_meshes
 from lpet_sim.recording.truth import Truth, WheelTruth
 from lpet_sim.recording.writer import RecordingWriter
-from lpet_sim.rover.drawing import Link, LinkMesh, RoverDrawing, joint_angles, rover_drawing
+from lpet_sim.rover.drawing import Link, RoverDrawing, joint_angles, rover_drawing
+from lpet_sim.rover.shapes import LinkMesh
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.terrain.box import Box
 from lpet_sim.terrain.figures import draw_map, draw_relief
@@ -34,7 +35,9 @@ class RoverArtist:
         """Draw the shapes of a rover."""
         self._writer, self._spec = writer, spec
         self._drawing = rover_drawing(spec)
-        writer.draw_rover([_drawn(link) for link in self._drawing.links if link.meshes])
+        writer.draw_rover(
+            [_drawn(link) for link in self._drawing.links if link.parent or link.meshes]
+        )
 
     def draw(self, truth: Truth) -> None:
         """Draw the moving joints of a piece of truth, twice a second."""
@@ -47,7 +50,7 @@ class RoverArtist:
 
 
 def _drawn(link: Link) -> DrawnLink:
-    mesh = join_meshes([_mesh(shape) for shape in link.meshes])
+    mesh = join_meshes([_mesh(shape) for shape in link.meshes]) if link.meshes else None
     return DrawnLink(link.name, mesh, _parent(link), link.T_parent_link)
 
 

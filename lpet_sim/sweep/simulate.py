@@ -148,7 +148,8 @@ class _Sensing:
             self._imu = Imu(suite.imu, frames.T_body_imu, frames.gravity_mps2, rng)
         if suite.wheels is not None:
             rng = stream(seed, "traverse", "wheels")
-            self._wheels = WheelEncoders(suite.wheels, len(frames.wheel_names), rng)
+            steers = tuple(bool(limit > 0) for limit in frames.steer_limit_rad)
+            self._wheels = WheelEncoders(suite.wheels, len(steers), rng, steers)
         if suite.stereo is not None and world.spec.images is not None and calibration.stereo:
             renderer = StereoRenderer(world.terrain, suite.stereo, frames.T_body_camera)
             pipeline = StereoPipeline(

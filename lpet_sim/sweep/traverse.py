@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 import lpet_sim
-from lpet_sim.errors import BlockedPlaceError
+from lpet_sim.errors import BlockedPlaceError, LpetError
 from lpet_sim.planning.clearance import RouteSpec
 from lpet_sim.planning.route import nearest_clear, plan_route_over
 from lpet_sim.recording.recording import Manifest
+from lpet_sim.rover.faults import check_stuck_wheels
+from lpet_sim.rover.model_spec import identity_of, rover_beside, wheel_names
 from lpet_sim.rover.spec import DriveSpec, RoverSpec
 from lpet_sim.sensors.suite import SensorSuiteSpec
 from lpet_sim.soil.load import soil_beside
@@ -73,14 +75,27 @@ class TraverseSpec(Spec):
     sensors: SensorSuiteSpec = SensorSuiteSpec()
     images: ImagesSpec | None = ImagesSpec()
 
+    @model_validator(mode="after")
+    def _wheels_of_the_rover(self) -> Self:
+        """Hold the wheels that are to be stuck to be the rover's; without any it is not read."""
+        try:
+            names = wheel_names(self.rover.model) if self.drive.stuck_wheels else ()
+        except LpetError:
+            return self  # a rover that is not there is told when it is to drive
+        try:
+            check_stuck_wheels(self.drive, names)
+        except LpetError as error:
+            raise ValueError(str(error)) from None
+        return self
+
     @classmethod
     def files_beside(cls, mapping: dict[str, Any], folder: Path) -> dict[str, Any]:
-        """Find the files of terrain and soils, that of the soil that stands for rocks too."""
+        """Find the files of terrain, soils (that which stands for rocks too) and rover."""
         found = dict(mapping)
         if "terrain" in mapping:
             found["terrain"] = terrain_beside(mapping["terrain"], folder)
         if "rover" in mapping:
-            found["rover"] = _rock_beside(mapping["rover"], folder)
+            found["rover"] = rover_beside(_rock_beside(mapping["rover"], folder), folder)
         return found
 
 
@@ -115,5 +130,8 @@ def planned_drive(spec: TraverseSpec, terrain: Terrain, seed: int) -> DriveSpec:
 def manifest_of(spec: TraverseSpec, drive: DriveSpec, seed: int) -> Manifest:
     """Say where a simulated recording comes from: specs as given, the path as planned, versions."""
     specs: dict[str, Any] = {"traverse": spec.to_mapping(), "drive": drive.to_mapping()}
+    rover = identity_of(spec.rover.model)
+    if rover is not None:
+        specs["rover_model"] = rover
     versions = {name: version(name) for name in _PACKAGES} | {"lpet": lpet_sim.__version__}
     return Manifest(source="simulation", seed=seed, specs=specs, versions=versions)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lpet_sim.rig import slope as slope_rig
-from lpet_sim.rig.files import SLOPE_HEADER, write_slope_csv
+from lpet_sim.rig.files import slope_header, write_slope_csv
 from lpet_sim.rig.published import published_beside
 from lpet_sim.rig.slope import (
     SlopeReport,
@@ -22,6 +22,7 @@ from lpet_sim.rig.slope import (
 )
 from lpet_sim.rig.slope_figure import plot_slope
 from lpet_sim.rig.slope_point import SlopePoint
+from lpet_sim.rover.model_spec import wheel_names
 from lpet_sim.soil.load import load_soil, published_curves
 
 SLOPES_DEG = (0.0, 8.0, 14.0)
@@ -105,7 +106,7 @@ def test_the_csv_holds_every_point_with_units(report: SlopeReport, tmp_path: Pat
     write_slope_csv(report, tmp_path / "slope.csv")
     with (tmp_path / "slope.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == SLOPE_HEADER
+    assert tuple(rows[0]) == slope_header(wheel_names("exomars"))
     assert len(rows) == len(report.points)
     for row, point in zip(rows, report.points, strict=True):
         assert float(row["slip_percent"]) / 100 == pytest.approx(point.slip, rel=1e-5)

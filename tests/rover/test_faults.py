@@ -3,19 +3,23 @@
 import numpy as np
 import pytest
 
-from lpet_sim.errors import SpecError
+from lpet_sim.errors import SpecError, UnknownNameError
 from lpet_sim.recording.arrays import NS_PER_S
-from lpet_sim.rover.mjcf import WHEELS
-from lpet_sim.rover.spec import DriveSpec, ForcedSlip, StuckWheel, WheelName
+from lpet_sim.rover.mjcf import bare_model
+from lpet_sim.rover.model_spec import wheel_names
+from lpet_sim.rover.spec import DriveSpec, ForcedSlip, StuckWheel
+from lpet_sim.sweep.traverse import TraverseSpec
 from tests.rover.episodes_of import THREE_METRES, drive_over
 from tests.rover.grounds import Waves
 
 GROUND = Waves(amplitude_m=0.01)
 
 
-def test_the_spec_names_the_wheels_as_the_model_does() -> None:
-    """In the same order."""
-    assert WheelName.__args__ == WHEELS
+def test_the_description_names_the_wheels_as_the_model_does() -> None:
+    """In the order of its motors."""
+    model = bare_model("exomars")
+    motors = [model.actuator(k).name for k in range(model.nu)]
+    assert tuple(motors[:6]) == tuple(f"drive_{name}" for name in wheel_names("exomars"))
 
 
 def test_a_stuck_wheel_stands_and_is_dragged_to_the_goal() -> None:
@@ -60,8 +64,11 @@ def test_a_fault_that_outlasts_the_drive_lasts_as_long_as_the_drive() -> None:
 def test_bad_faults_are_refused_with_what_would_be_valid() -> None:
     """A wheel that there is not, a kind that there is not, two locks of one wheel at once."""
     ahead = {"waypoints_m": THREE_METRES}
-    with pytest.raises(SpecError, match=r"stuck_wheels.0.wheel.*'front_left', 'front_right'"):
-        DriveSpec.from_mapping({**ahead, "stuck_wheels": [{"wheel": "left", "start_s": 1}]})
+    left = {**ahead, "stuck_wheels": [{"wheel": "left", "start_s": 1}]}
+    with pytest.raises(SpecError, match=r"stuck_wheels.0 'left': .*front_left, front_right"):
+        TraverseSpec.from_mapping({"terrain": "exomars", "drive": left})
+    with pytest.raises(UnknownNameError, match=r"stuck_wheels.0 'left': .*front_left"):
+        drive_over(GROUND, stuck_wheels=(StuckWheel(wheel="left", start_s=1.0),))
     with pytest.raises(SpecError, match=r"failures.ends_on.0.*'tipped', 'entrapped', 'hung_up'"):
         DriveSpec.from_mapping({**ahead, "failures": {"ends_on": ["rolled"]}})
     twice = [{"wheel": "rear_left", "start_s": s} for s in (1.0, 9.0)]

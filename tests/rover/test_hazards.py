@@ -10,7 +10,7 @@ import pytest
 
 from lpet_sim.recording.arrays import NS_PER_S
 from lpet_sim.rng import stream
-from lpet_sim.rover.mjcf import WHEELS
+from lpet_sim.rover.model_spec import wheel_names
 from lpet_sim.rover.scene import Scene
 from lpet_sim.rover.spec import FailureSpec, ForcedSlip, RoverSpec, StuckWheel
 from lpet_sim.terrain.box import Box
@@ -18,6 +18,7 @@ from lpet_sim.terrain.spec import TerrainSpec
 from tests.rover.episodes_of import Outcome, drive_over
 from tests.rover.grounds import Waves
 
+WHEELS = wheel_names("exomars")
 RECORD_ONLY = FailureSpec(ends_on=())
 
 

@@ -37,7 +37,8 @@ def _plain(scale: float) -> SlipTable:
 
 
 def _respond(law: TabulatedLaw, **forces: object) -> WheelResponse:
-    state, response = WheelState(omega_radps=np.full(6, 0.3)), WheelResponse()
+    state, response = WheelState.of(6), WheelResponse.of(6)
+    state.omega_radps[:] = 0.3
     for name, values in forces.items():
         getattr(state, name)[:] = values
     law.respond(state, response)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lpet_sim.recording.arrays import Array
-from lpet_sim.rover.mjcf import WHEELS
+from lpet_sim.rover.model_spec import wheel_names
 from lpet_sim.rover.spec import RoverSpec
 from lpet_sim.rover.wheel_soil import (
     DEEPEST,
@@ -33,6 +33,8 @@ from tests.rover.grounds import Waves, of_soil, tilted
 SPEED_MPS = 0.05
 WEIGHT_N = 310 * 3.721
 BOULDERS = ((1.0, 0.6, 0.16), (1.3, -0.55, 0.2), (1.9, 0.5, 0.12), (2.1, -0.6, 0.1))
+
+WHEELS = wheel_names("exomars")
 
 
 def _tan(degrees: float) -> float:
@@ -236,7 +238,7 @@ def test_a_grousered_wheels_law_sinks_in_proportion_to_its_tips() -> None:
     depths = []
     for wheel in (rover, tall):
         law = tabulated_law(WheelSoilSpec(wheel=wheel), [soil], rover, share_n, 3.721)
-        told, answer = WheelState(), WheelResponse()
+        told, answer = WheelState.of(6), WheelResponse.of(6)
         told.load_n[:] = share_n
         law.respond(told, answer)
         depths.append(answer.sinkage_m[0])
