@@ -22,7 +22,7 @@ TUTORIALS = ("first_traverse.md", "reading_a_recording.md")
 """Pages that are run from top to bottom, the second one where the first has left its files."""
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _NAMED = re.compile(r"into `([\w.]+)`:\s*\Z")
-_COMMAND = re.compile(r"^\s*(?:\$ )?((?:lpet|python -m scenarios\.)[^\n]*)$", re.MULTILINE)
+_COMMAND = re.compile(r"^\s*(?:\$ )?((?:lpet |python -m scenarios\.)[^\n]*)$", re.MULTILINE)
 
 
 def test_tutorials_run_as_they_stand(tmp_path: Path) -> None:
