@@ -124,7 +124,7 @@ class SlamRun:
         self._slip_threshold = chi_square_threshold(POSE, 1.0 - spec.slip_probability)
         self._standing = spec.anchors is not None
         self._rested = self._moved = 0
-        self._unfixed = np.zeros(6)
+        self._unfixed, self._held = np.zeros(6), False
         self._log: dict[str, list[float]] = {name: [] for name in LOGGED}
 
     def advance(self, step: Step) -> None:
@@ -132,7 +132,7 @@ class SlamRun:
         scale = self._spec.noise_scale
         step = replace(step, noise=scale * step.noise, drift_px=scale * step.drift_px)
         self.state.advance(step)
-        self._unfixed = self._unfixed + np.abs(step.twist)
+        self._unfixed, self._held = self._unfixed + np.abs(step.twist), step.held
         if self._standing and self._spec.anchors is not None:
             self._watch_standstill(step.twist, self._spec.anchors)
 
@@ -193,7 +193,9 @@ class SlamRun:
     def _gated(self, seen: Innovations) -> tuple[bool, Innovations, Bools, Joint]:
         """Tell whether odometry slipped, and which sightings fit by themselves."""
         fits, joint = self._fits(seen), self.state.joint(seen)
-        if self._spec.slip_probability == 0.0 or len(seen) < self._spec.sightings_min:
+        asked = self._spec.slip_probability > 0.0 and len(seen) >= self._spec.sightings_min
+        # A step that was only held is no odometry to be contradicted, but may be far off.
+        if not asked or (self._held and 2 * fits.sum() >= len(seen)):
             return False, seen, fits, joint
         moves, sizes, agree = slam_slips.moves(self.state, seen), self._slip_sizes(), fits
         if not fits.all():
@@ -277,4 +279,4 @@ def _step(odometry: OdometryStream | None, k: int, poses: list[SE3], spec: SlamS
         return Step(np.zeros(6), np.zeros((0, 6)), lasting)
     held = (poses[-2].inverse() @ poses[-1]).log() if k > 1 else np.zeros(6)
     noise = np.diag(np.repeat([spec.free_sigma_m, spec.free_sigma_rad], 3))
-    return Step(held, noise, lasting)
+    return Step(held, noise, lasting, held=True)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from estimators import gaussian_blocks
 from estimators.slam_state import SlamState
 from estimators.slam_values import Innovations
+from lpet_sim.errors import BrokenFilterError
 from lpet_sim.recording.arrays import Array
 
 Mean = tuple[Array, Array, Array, Array, Array, Array]
@@ -18,7 +19,8 @@ def relinearised(
     """Give the innovations of known landmarks with derivatives at the pose they lead to.
 
     ``dx_i+1 = K_i (z - h(x_i) + H_i dx_i)``, an iterated filter: the innovations that come back
-    belong to the estimate as it is, which is not changed.
+    belong to the estimate as it is, which is not changed. Where the way leads nowhere, innovations
+    come back as they were.
 
     Args:
         state: The filter's.
@@ -30,16 +32,22 @@ def relinearised(
         Bell and Cathey (1993), The iterated Kalman filter update as a Gauss-Newton method
         [recalled].
     """
-    start, dx = _mean(state), None
-    for _ in range(rounds):
-        joint = state.joint(believed)
-        dx = joint.HP.T @ gaussian_blocks.solved(joint.L, believed.r.ravel())
-        state.retract(dx)
-        believed = state.innovations(believed.slots, believed.z, believed.variance)
-        believed = replace(believed, r=believed.r + believed.moved_by(dx))
-        there = state.innovations(known.slots, known.z, known.variance)
-        _restore(state, start)
-    return known if dx is None else replace(there, r=there.r + there.moved_by(dx))
+    start, there = _mean(state), known
+    try:
+        for _ in range(rounds):
+            joint = state.joint(believed)
+            dx = joint.HP.T @ gaussian_blocks.solved(joint.L, believed.r.ravel())
+            state.retract(dx)
+            believed = state.innovations(believed.slots, believed.z, believed.variance)
+            believed = replace(believed, r=believed.r + believed.moved_by(dx))
+            there = state.innovations(known.slots, known.z, known.variance)
+            there = replace(there, r=there.r + there.moved_by(dx))
+            _restore(state, start)
+        gaussian_blocks.square_root(state.joint(there).S)
+    except BrokenFilterError:
+        # They lead nowhere: to where their derivatives are no more than rounding.
+        return known
+    return there
 
 
 def _mean(state: SlamState) -> Mean:

@@ -89,9 +89,11 @@ class Step:
         lasting: What the lasting errors do: turning at 1 rad/s about x, y, z, and scale, by one
             standard deviation, Shape (4, 6).
         drift_px: Random walk of sightings of a landmark with the distance [px/sqrt(m)].
+        held: Whether there was no odometry, and the step is held to be like the one before it.
     """
 
     twist: Array
     noise: Array
     lasting: Array
     drift_px: float = 0.0
+    held: bool = False

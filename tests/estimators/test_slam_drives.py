@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 from benchmarks.slam_world import SIGMA, Drive
-from estimators import gaussian, gaussian_blocks
+from estimators import gaussian, gaussian_blocks, slam
 from estimators.odometry_steps import image_odometry
 from estimators.slam import Slam, SlamRun, odometry_step
 from estimators.slam_map import LASTING, POSE
@@ -97,6 +97,19 @@ def test_a_slip_through_which_most_sightings_fit_is_flagged(form: str, share: fl
         log = blind.diagnostics
         assert log["accepted"][SLIP] > 0.6 * log["matched"][SLIP]
         assert nees(found, drive.poses(), SLIP) < THREE_SIGMA < nees(blind, drive.poses(), SLIP)
+
+
+@pytest.mark.parametrize(
+    ("held", "metres", "flagged"), [(False, 0.04, [SLIP]), (True, 0.04, []), (True, 1.0, [SLIP])]
+)
+def test_a_step_that_is_only_held_is_asked_where_most_sightings_do_not_fit(
+    monkeypatch: pytest.MonkeyPatch, held: bool, metres: float, flagged: list[int]
+) -> None:
+    """It is no odometry that is contradicted a little; a wild one is found all the same."""
+    tell = slam.odometry_step
+    monkeypatch.setattr(slam, "odometry_step", lambda o, k: replace(tell(o, k), held=held))
+    found = Slam().estimate(slipped(Drive(40).measurements(0), metres))
+    assert np.flatnonzero(found.diagnostics["slipped"]).tolist() == flagged
 
 
 def under_a_skyline(given: Measurements, poses: SE3, seed: int) -> Measurements:

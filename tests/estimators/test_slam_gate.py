@@ -7,9 +7,10 @@ import pytest
 
 from estimators import slam_gate
 from estimators.gaussian import chi_square_threshold
+from estimators.slam_iterate import relinearised
 from estimators.slam_map import POSE
 from estimators.slam_state import SlamState
-from estimators.slam_values import Innovations
+from estimators.slam_values import Innovations, Joint
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rng import stream
 from tests.estimators.slam_worlds import (
@@ -150,3 +151,22 @@ def test_wrong_sightings_of_a_run_do_not_enter_the_state() -> None:
     np.testing.assert_allclose(part.S, cut.S, rtol=1e-12)
     np.testing.assert_allclose(np.tril(cut.L) @ np.tril(cut.L).T, part.S, rtol=1e-12)
     assert whole.take(np.ones(4, dtype=bool)) is whole
+
+
+def test_sightings_that_lead_nowhere_are_left_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where an iteration breaks the covariance, neither it nor the estimate is what comes back."""
+    state, known, _ = sighted("keyframe")
+    joint, before = state.joint, state.pose
+    calls: list[int] = []
+
+    def broken(seen: Innovations) -> Joint:
+        calls.append(len(seen))
+        found = joint(seen)
+        return Joint(found.HP, -found.S) if len(calls) > 2 else found
+
+    monkeypatch.setattr(state, "joint", broken)
+    assert relinearised(state, known, known, 4) is known
+    assert len(calls) == 3
+    assert np.array_equal(state.pose.matrix(), before.matrix())
+    monkeypatch.undo()
+    assert relinearised(state, known, known, 4) is not known
