@@ -251,8 +251,12 @@ def test_a_terrain_is_drawn_from_above_and_in_relief(lpet: Lpet, tmp_path: Path)
 
 
 def started(spec: Path, out: Path) -> subprocess.Popen[str]:
-    """Start a long drive in a process of its own and wait until its file grows."""
-    command = [sys.executable, "-c", "from lpet_sim.cli import main; main()"]
+    """Start a long drive in a process of its own and wait until its file grows.
+
+    It hears interrupts even where these tests run in a shell's background, which ignores them.
+    """
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    command = [sys.executable, "-c", heard + "from lpet_sim.cli import main; main()"]
     arguments = ["simulate", str(spec), "--out", str(out)]
     process = subprocess.Popen([*command, *arguments], stderr=subprocess.PIPE, text=True)
     patience = time.monotonic() + 120
