@@ -20,6 +20,7 @@ from lpet_sim.cli_study import study
 from lpet_sim.cli_sweep import sweep
 from lpet_sim.cli_tradeoff import tradeoff
 from lpet_sim.errors import LpetError
+from lpet_sim.spec import read_fields
 from lpet_sim.terminal import bar, print_tables, wrote
 
 app = typer.Typer(
@@ -140,12 +141,19 @@ def estimate(
         list[str] | None,
         typer.Option(help="Which one; may be given again. If absent, all that have their streams."),
     ] = None,
+    spec: Annotated[
+        Path | None, typer.Option(help="YAML of the spec of the one estimator that is named.")
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(help="What the estimate of the one that is named is called.")
+    ] = None,
 ) -> None:
     """Run estimators on a recording and lay their estimates over it."""
     from lpet_sim.sweep.score import estimate_recording
 
+    fields = None if spec is None else read_fields(spec)
     with bar(f"estimating {run.name}") as progress:
-        estimates = estimate_recording(run, estimator or None, progress)
+        estimates = estimate_recording(run, estimator or None, progress, fields=fields, called=name)
     typer.echo(f"added {', '.join(estimate.name for estimate in estimates)}")
     wrote(run)
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from lpet_sim.errors import SpecError
-from lpet_sim.spec import read_yaml
+from lpet_sim.spec import read_fields
 from lpet_sim.terminal import bar, print_tables
 
 
@@ -25,9 +24,7 @@ def check_estimator(
     from lpet_sim.sweep.conformance import check_estimator as run
     from lpet_sim.sweep.conformance import finding_table
 
-    fields = {} if spec is None else read_yaml(spec)
-    if not isinstance(fields, dict):
-        raise SpecError(f"{spec}: must be a mapping of keys to values")
+    fields = {} if spec is None else read_fields(spec)
     with bar(f"driving for {name}") as progress:
         findings = run(name, fields, progress)
     print_tables([finding_table(name, findings)])

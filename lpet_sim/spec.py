@@ -83,6 +83,18 @@ def read_yaml(path: Path) -> object:
         raise SpecError(f"{path} is not valid YAML: {reason}") from None
 
 
+def read_fields(path: Path) -> dict[str, Any]:
+    """Read a YAML file that holds a mapping: the fields of a spec that is not known yet.
+
+    Raises:
+        SpecError: The file cannot be read, is not YAML, or holds no mapping.
+    """
+    fields = read_yaml(path)
+    if not isinstance(fields, dict):
+        raise SpecError(f"{path}: must be a mapping of keys to values")
+    return fields
+
+
 def _first_problem(cls: type[BaseModel], error: ValidationError) -> str:
     """Turn pydantic's first complaint into one sentence that names what is valid."""
     problem = error.errors(include_url=False)[0]

@@ -237,6 +237,27 @@ def test_the_chain_of_commands_ends_in_a_verdict(lpet: Lpet, spec: Path, tmp_pat
     ]  # fmt: skip
 
 
+def test_an_estimator_is_run_by_a_spec_and_under_a_name_of_its_own(
+    lpet: Lpet, run: Path, tmp_path: Path
+) -> None:
+    """It stands beside the one by default; a spec is for one estimator, and has its keys."""
+    before, spec = run.read_bytes(), tmp_path / "own.yaml"
+    spec.write_text("scal: 2\n")
+    one = ("--estimator", "dead_reckoning")
+    assert_refused(lpet("estimate", run, *one, "--spec", spec), "'scal'", "valid keys")
+    assert_refused(lpet("estimate", run, "--spec", spec), "one estimator")
+    assert_refused(lpet("estimate", run, *one, "--estimator", "slam", "--name", "x"), "one only")
+    assert run.read_bytes() == before
+    spec.write_text("tilt_sigma_rad: 0.5\n")
+    assert lpet("estimate", run, *one).code == 0
+    assert lpet("estimate", run, *one, "--spec", spec, "--name", "mine").code == 0
+    found = read_estimates(run)
+    assert sorted(found) == ["dead_reckoning", "mine"]
+    doubted, usual = found["mine"].covariance, found["dead_reckoning"].covariance
+    assert doubted is not None and usual is not None
+    assert doubted[-1, 2, 2] > 2 * usual[-1, 2, 2]
+
+
 def test_a_terrain_is_drawn_from_above_and_in_relief(lpet: Lpet, tmp_path: Path) -> None:
     """Two pictures and a table of what was measured."""
     out = tmp_path / "pictures"

@@ -207,11 +207,14 @@ def worst_run_sheet(rows: Rows, best: AlgorithmOutcome) -> Sheet:
         error = float(of.errors("worst_percent")[k])
         failure = str(of["failure"][k]) or "none"
         where = words(f"worst_runs/{run}.rrd")
-        lines.append((words(run), words(data_set), words(failure), number(error, ".3f"), where))
+        lines.append((words(data_set), words(failure), number(error, ".3f"), where))
     headings = (
-        *heads("run", "drive", "failure", words_first=3),
+        *heads("drive", "failure", words_first=2),
         Heading("worst error [%]"),
-        Heading("recording", words=True),
+        Heading("recording", words=True, page_only=True),
     )
-    note = "Each one's recording holds what was measured and estimated: open it with lpet view."
+    note = (
+        "Recordings of what was measured and estimated lie in worst_runs/, named by their drives: "
+        "open them with lpet view."
+    )
     return Sheet("worst-runs", "The worst runs of the best algorithm", note, headings, tuple(lines))

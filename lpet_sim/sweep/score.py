@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from estimators import ESTIMATORS, Estimator, build_estimator
 from estimators.dead_reckoning import DeadReckoning
 from estimators.frame_to_frame import FrameToFrame
-from lpet_sim.errors import RecordingError
+from lpet_sim.errors import RecordingError, SpecError
 from lpet_sim.evaluation import RunResult, evaluate
 from lpet_sim.evaluation.attribution import ErrorAttribution, attribute_error
 from lpet_sim.evaluation.errors import ErrorSeries, error_series
@@ -58,7 +59,12 @@ class Score:
 
 
 def estimate_recording(
-    path: Path, names: Sequence[str] | None = None, progress: Progress = silent
+    path: Path,
+    names: Sequence[str] | None = None,
+    progress: Progress = silent,
+    *,
+    fields: Mapping[str, Any] | None = None,
+    called: str | None = None,
 ) -> tuple[Estimate, ...]:
     """Run estimators on a recording's measurements and lay their estimates over it.
 
@@ -66,16 +72,23 @@ def estimate_recording(
         path: The recording; it is replaced as a whole once all estimates are there.
         names: Which estimators; None for all that the recording has the streams for.
         progress: Called after each estimator.
+        fields: Fields of the spec of the one estimator that is named, as read from YAML.
+        called: What the estimate of the one that is named is called; None for its own name.
 
     Raises:
         UnknownNameError: A name is not an estimator's.
+        SpecError: The fields do not make its spec, or fields or a name for other than one.
         RecordingError: The recording cannot be read or lacks a stream.
     """
-    asked = None if names is None else [build_estimator(name) for name in names]
+    if (fields is not None or called is not None) and len(names or ()) != 1:
+        raise SpecError("a spec and a name are for one estimator: name one, and one only")
+    asked = None if names is None else [build_estimator(name, dict(fields or {})) for name in names]
     recording = read_recording(path)
     measurements = recording.measurements
     built = _fed_by(measurements) if asked is None else asked
     estimates = tuple(e.estimate(measurements) for e in track(built, len(built), progress))
+    if called is not None:
+        estimates = tuple(replace(estimate, name=called) for estimate in estimates)
     slip = find_slip_in(recording, [*read_estimates(path).values(), *estimates])
     add_estimates(
         path,

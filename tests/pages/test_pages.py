@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import csv
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,51 +16,120 @@ from typing import Any
 import pytest
 import typer
 
-from lpet_sim.cli import app
+from lpet_sim.cli import app, main
+from lpet_sim.recording.reader import read_estimates, read_recording
+from lpet_sim.sweep.sweep_store import read_table
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
-TUTORIALS = ("first_traverse.md", "reading_a_recording.md")
-"""Pages that are run from top to bottom, the second one where the first has left its files."""
+TUTORIALS = (
+    "first_traverse.md",
+    "reading_a_recording.md",
+    "own_estimator.md",
+    "choosing_a_sensor.md",
+)
+"""Pages that are run from top to bottom, each one where the first has left its recording."""
+WRITTEN = {"yaml", "xml"}
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _NAMED = re.compile(r"into `([\w.]+)`:\s*\Z")
+_EXIT = re.compile(r"# exit code (\d)\s*\Z")
 _COMMAND = re.compile(r"^\s*(?:\$ )?((?:lpet |python -m scenarios\.)[^\n]*)$", re.MULTILINE)
 
 
-def test_tutorials_run_as_they_stand(tmp_path: Path) -> None:
-    """Every block of them: YAML into the file that is named, commands, and Python."""
-    names: dict[str, Any] = {}
-    for page in TUTORIALS:
-        text = (DOCS / page).read_text()
-        for block in _BLOCK.finditer(text):
-            _run_block(block[1], block[2], text[: block.start()], tmp_path, names)
-    assert (tmp_path / "first.rrd").stat().st_size > 10_000
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give a folder in which the first tutorial has been run."""
+    folder = tmp_path_factory.mktemp("first")
+    names = run_page(TUTORIALS[0], folder)
+    assert names == {}
+    return folder
+
+
+@pytest.fixture
+def folder(first: Path, tmp_path: Path) -> Path:
+    """Give a folder of its own with what the first tutorial leaves, and the worked examples."""
+    shutil.copytree(first, tmp_path, dirs_exist_ok=True)
+    shutil.copy(DOCS / "examples" / "straight.c", tmp_path)
+    return tmp_path
+
+
+def test_the_first_traverse_leaves_a_recording(first: Path) -> None:
+    """With estimates in it."""
+    assert set(read_estimates(first / "first.rrd")) >= {"dead_reckoning", "frame_to_frame", "slam"}
+
+
+def test_the_recording_is_read_as_the_page_reads_it(folder: Path) -> None:
+    """The sightings of the first image are there."""
+    names = run_page(TUTORIALS[1], folder)
     assert names["first"].shape[1] == 3
 
 
-def _run_block(kind: str, code: str, before: str, folder: Path, names: dict[str, Any]) -> None:
-    if kind == "yaml":
-        named = _NAMED.search(before)
-        assert named is not None, f"no file is named for:\n{code}"
-        (folder / named[1]).write_text(code)
-    elif kind == "sh":
-        for line in code.splitlines():
-            _run(shlex.split(line), folder)
-    elif kind == "python":
-        here = Path.cwd()
-        os.chdir(folder)
-        try:
+def test_an_estimator_written_from_the_page_runs_beside_our_own(folder: Path) -> None:
+    """In Python and in C: rows of one sweep, the same to within the text of a TUM file."""
+    if shutil.which("cc") is None:
+        pytest.skip("there is no C compiler 'cc'")
+    run_page(TUTORIALS[2], folder)
+    rows = {str(row["variant"]): row for row in read_table(folder / "both" / "rows.parquet")[0]}
+    ours, written, in_c = (rows[name] for name in ("dead_reckoning", "straight", "straight_c"))
+    assert written["failure"] == in_c["failure"]
+    assert written["end_error_m"] == pytest.approx(in_c["end_error_m"], rel=1e-6)
+    assert written["end_error_m"] > 2 * ours["end_error_m"]
+
+
+def test_a_sensor_is_chosen_as_the_page_chooses_it(folder: Path) -> None:
+    """Survivors are simulated, and the recommended sensor is carried by a drive."""
+    names = run_page(TUTORIALS[3], folder)
+    simulated = [row for row in read_candidates(folder / "cameras") if int(row["runs"]) > 0]
+    assert len(names["candidates"]) == 48
+    assert len(simulated) == 4
+    declared = read_recording(folder / "second.rrd").measurements.calibration
+    assert declared.stereo is not None
+    assert declared.stereo.width_px == names["picked"].candidate.resolution_px
+
+
+def read_candidates(folder: Path) -> list[dict[str, str]]:
+    """Read the rows of a trade-off's candidates."""
+    with (folder / "candidates.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def run_page(page: str, folder: Path) -> dict[str, Any]:
+    """Run every block: YAML and modules into the file that is named, commands, and Python."""
+    names: dict[str, Any] = {}
+    text = (DOCS / page).read_text()
+    for block in _BLOCK.finditer(text):
+        named = _NAMED.search(text[: block.start()])
+        _run_block(block[1], block[2], None if named is None else folder / named[1], names, folder)
+    return names
+
+
+def _run_block(
+    kind: str, code: str, file: Path | None, names: dict[str, Any], folder: Path
+) -> None:
+    if file is not None:
+        file.write_text(code)
+        return
+    assert kind not in WRITTEN, f"no file is named for:\n{code}"
+    with contextlib.chdir(folder):
+        if kind == "sh":
+            for line in code.splitlines():
+                expected = _EXIT.search(line)
+                ended = _run(shlex.split(line, comments=True))
+                assert ended == (int(expected[1]) if expected else 0), line
+        elif kind == "python":
             exec(compile(code, "page", "exec"), names)
-        finally:
-            os.chdir(here)
 
 
-def _run(words: list[str], folder: Path) -> None:
-    assert words[0] == "lpet"
-    command = [sys.executable, "-c", "from lpet_sim.cli import main; main()", *words[1:]]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{' '.join(words)}: {done.stderr}"
+def _run(words: list[str]) -> int:
+    """Run a command, ours in this process, and give its exit code."""
+    if words[0] != "lpet":
+        return subprocess.run(words, check=False).returncode
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as stop:
+        patch.setattr(sys, "argv", words)
+        main()
+    assert isinstance(stop.value.code, int)
+    return stop.value.code
 
 
 def _command(words: list[str]) -> Any:

@@ -1,13 +1,10 @@
-"""The page on own estimators: its code is the examples, its YAML is taken, its table whole."""
+"""The page on own estimators: its code is the example, its table whole."""
 
 from __future__ import annotations
 
 import re
 
-import yaml
-
 from lpet_sim import failures
-from lpet_sim.sweep.sweep_spec import VariantSpec
 from tests.plugins.examples import EXAMPLES
 
 PAGE = (EXAMPLES.parent / "own_estimator.md").read_text()
@@ -17,13 +14,6 @@ def test_the_class_on_the_page_is_the_example() -> None:
     """To the letter; the example is run in other tests."""
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     assert code == (EXAMPLES / "straight.py").read_text()
-
-
-def test_the_variants_on_the_page_are_variants() -> None:
-    """Each block that begins with them."""
-    blocks = re.findall(r"```\n(variants:.*?)```", PAGE, re.DOTALL)
-    variants = [VariantSpec.from_mapping(v) for b in blocks for v in yaml.safe_load(b)["variants"]]
-    assert [v.estimator for v in variants] == ["slam", "straight:Straight", "program"]
 
 
 def test_every_failure_is_in_the_table() -> None:
