@@ -15,10 +15,12 @@ from typing import Any
 
 import pytest
 import typer
+import yaml
 
 from lpet_sim.cli import app, main
 from lpet_sim.recording.reader import read_estimates, read_recording
 from lpet_sim.sweep.sweep_store import read_table
+from lpet_sim.sweep.traverse import TraverseSpec
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -86,6 +88,23 @@ def test_a_sensor_is_chosen_as_the_page_chooses_it(folder: Path) -> None:
     declared = read_recording(folder / "second.rrd").measurements.calibration
     assert declared.stereo is not None
     assert declared.stereo.width_px == names["picked"].candidate.resolution_px
+
+
+def test_the_code_of_the_readme_runs(first: Path, tmp_path: Path) -> None:
+    """Its YAML is a traverse's, its Python runs beside a recording."""
+    shutil.copy(first / "first.rrd", tmp_path / "run.rrd")
+    blocks = _BLOCK.findall((ROOT / "README.md").read_text())
+    drives = [yaml.safe_load(code) for kind, code in blocks if kind == "yaml"]
+    assert [TraverseSpec.from_mapping(drive).drive.waypoints_m[-1] for drive in drives] == [
+        (20.0, 5.0),
+        (20.0, 5.0),
+    ]
+    names: dict[str, Any] = {}
+    with contextlib.chdir(tmp_path):
+        for kind, code in blocks:
+            if kind == "python":
+                exec(compile(code, "README", "exec"), names)
+    assert names["bounded"].estimate(names["recording"].measurements).trajectory.t_ns.size > 3
 
 
 def read_candidates(folder: Path) -> list[dict[str, str]]:
