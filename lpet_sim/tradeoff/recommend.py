@@ -250,9 +250,10 @@ def recommend(judged: Sequence[Judged], spec: TradeoffSpec) -> Recommendation:
         least = min(j.cost for j in good)
         tied = [j for j in good if j.cost <= (1.0 + spec.rule.tie_ratio) * least]
         chosen = min(tied, key=lambda j: (j.upper_ratio, j.index))
+        best = f"of the {len(tied)} cheapest of them it is the most accurate"
         reason = (
             f"{len(good)} of {len(judged)} candidates meet the requirement with a margin of "
-            f"{spec.rule.margin:.0%}; of the {len(tied)} cheapest of them it is the most accurate"
+            f"{spec.rule.margin:.0%}; {best if len(tied) > 1 else 'it is the cheapest of them'}"
         )
     else:
         chosen = min(judged, key=lambda j: (j.upper_ratio, j.prediction.error_ratio, j.index))

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from lpet_sim.evaluation.charts.style import plain_ticks
 from lpet_sim.evaluation.figures import COLOURS, save
 from lpet_sim.recording.arrays import Array
 from lpet_sim.tradeoff.recommend import cost_table
@@ -58,6 +59,9 @@ def plot_pareto(result: TradeoffResult) -> Figure:
         axes.set(xlabel=label, xscale="linear" if k == len(_PROXIES) else "log", yscale="log")
         _limit(axes, result)
         axes.grid(alpha=0.3, which="both")
+        if k < len(_PROXIES):
+            plain_ticks(axes.xaxis)
+    plain_ticks(panels[0].yaxis)
     panels[0].set_ylabel(f"predicted error after {result.spec.site.distance_m:g} m [%]")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
@@ -113,6 +117,7 @@ def _curve(axes: Axes, one: Sensitivity) -> None:
         axes.plot(shown, error, "o-", color=COLOURS[1])
     axes.set(xlabel=_LABELS[one.parameter], yscale="log")
     axes.grid(alpha=0.3, which="both")
+    plain_ticks(axes.yaxis)
 
 
 def plot_agreement(predicted: Sequence[float], simulated: Mapping[str, Sequence[float]]) -> Figure:
@@ -131,6 +136,8 @@ def plot_agreement(predicted: Sequence[float], simulated: Mapping[str, Sequence[
     axes.plot(ends, ends, color="black", lw=1, label="equal to the prediction")
     axes.set(xlabel="predicted RMS error [% of the distance]", xscale="log", yscale="log")
     axes.set_ylabel("simulated RMS error [% of the distance]")
+    plain_ticks(axes.xaxis)
+    plain_ticks(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
     axes.legend(loc="upper left")
     return figure

@@ -245,7 +245,7 @@ def _sensitivity_table(result: TradeoffResult) -> Table:
     for one in sorted(result.sensitivity, key=lambda one: -one.first_order):
         best = int(np.argmin(one.error_ratio))
         value = one.values[best]
-        shown = value if isinstance(value, str) else f"{value:.3g}"
+        shown = value if isinstance(value, str) else f"{value:.4g}"
         figures = f"{one.rank_correlation:+.2f}", f"{one.first_order:.2f}"
         table.add_row(one.parameter, *figures, shown, f"{100 * one.error_ratio[best]:.3f}")
     return table

@@ -21,6 +21,7 @@ from lpet_sim.cli import app, main
 from lpet_sim.recording.reader import read_estimates, read_recording
 from lpet_sim.sweep.sweep_store import read_table
 from lpet_sim.sweep.traverse import TraverseSpec
+from lpet_sim.tradeoff.recommend import RecommendedSensor
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -85,6 +86,10 @@ def test_a_sensor_is_chosen_as_the_page_chooses_it(folder: Path) -> None:
     simulated = [row for row in read_candidates(folder / "cameras") if int(row["runs"]) > 0]
     assert len(names["candidates"]) == 48
     assert len(simulated) == 4
+    predicted = RecommendedSensor.from_yaml(folder / "predicted" / "recommended.yaml").candidate
+    assert predicted.image_interval_m == 0.5
+    assert names["picked"].candidate.image_interval_m == 0.1
+    assert names["picked"].candidate.resolution_px == 1024
     declared = read_recording(folder / "second.rrd").measurements.calibration
     assert declared.stereo is not None
     assert declared.stereo.width_px == names["picked"].candidate.resolution_px

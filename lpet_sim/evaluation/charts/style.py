@@ -9,6 +9,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
@@ -21,6 +22,7 @@ _MARKERS = "osD^vPX*"
 _WIDTH_IN = 5.5
 _FONT_PT = 9.0
 _WIDE = 8.0
+_DECADES_ONLY = 3.0
 _SETTINGS: Any = {
     "text.color": INK,
     "axes.labelcolor": INK,
@@ -76,12 +78,26 @@ def log_error_axis(axes: Axes, finite: Array) -> float:
     low, high = (values.min(), values.max()) if len(values) else (0.1, 1.0)
     axes.set_yscale("log")
     axes.set_ylim(low / 1.3, high * 1.5)
-    wide = high / low > _WIDE
-    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if wide else (1, 1.5, 2, 3, 5, 7)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_locator(NullLocator())
+    plain_ticks(axes.yaxis)
     axes.grid(alpha=0.6)
     return float(high * 100)
+
+
+def plain_ticks(axis: Axis) -> None:
+    """Label a logarithmic axis with plain numbers at round places, few enough not to touch.
+
+    Args:
+        axis: The axis, after all is drawn that sets its limits.
+    """
+    low, high = axis.get_view_interval()
+    decades = np.log10(high / low)
+    if decades > _DECADES_ONLY:
+        places: tuple[float, ...] = (1,)
+    else:
+        places = (1, 2, 5) if high / low > _WIDE else (1, 1.5, 2, 3, 5, 7)
+    axis.set_major_locator(LogLocator(subs=places))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
 
 
 def swept_axis(axes: Axes, values: Sequence[float], label: str) -> None:
