@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+import numpy as np
 from rich.table import Table
 from rich.text import Text
 
@@ -158,6 +159,7 @@ def _rows(requirement: Requirement) -> list[tuple[str, Callable[[RunResult], str
         ("distance [m]", lambda r: f"{r.distance_m:.2f}"),
         ("covered [%]", lambda r: f"{100 * r.completion:.1f}"),
         ("end error [m]", lambda r: f"{math.hypot(*r.endpoint_error_m):.4f}"),
+        ("RMS error [m], not aligned", _rms),
         ("end error [% of dist.]", lambda r: f"{100 * r.endpoint_ratio:.3f}"),
         (
             f"worst after {requirement.start_m:g} m [% of dist.]",
@@ -167,6 +169,14 @@ def _rows(requirement: Requirement) -> list[tuple[str, Callable[[RunResult], str
         ("worst roll, pitch, yaw [deg]", lambda r: _degrees(r.worst_attitude_rad, ".2f")),
         ("NEES at the end [6 dof]", lambda r: f"{r.nees_end['pose']:.2f}" if r.nees_end else "-"),
     ]
+
+
+def _rms(result: RunResult) -> str:
+    """Give the RMS of the position error over all poses, the absolute trajectory error."""
+    if result.series is None:
+        return "-"
+    squares = np.sum(result.series.position_error_m**2, axis=1)
+    return f"{math.sqrt(squares.mean()):.4f}"
 
 
 def _drift(segment: SegmentDrift | None) -> str:
