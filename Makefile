@@ -47,6 +47,7 @@ experiments: opengl
 
 paper: $(STAMP) ## the paper's experiment: hours; goes on where it was
 	$(BIN)/python -m scenarios.paper_experiment
+	$(BIN)/python -m scenarios.paper_bands
 
 docs: $(STAMP) ## the site, in out/site
 	$(BIN)/mkdocs build -q

@@ -178,6 +178,11 @@ def test_the_papers_experiment_runs_on_data_sets_driven_for_it(tmp_path: Path) -
         rows = {row["variant"]: row for row in csv.DictReader(file)}
     best = float(rows["m10-n9999-coupled-observable-standard"]["worst median [%]"])
     assert best < 0.1 * float(rows["odometry"]["worst median [%]"])
+    bands = run_quick("paper_bands.py", tmp_path, *few, *where[:2], "--out", str(tmp_path / "out"))
+    with written_by(bands)[1].open() as file:
+        lines = list(csv.DictReader(file))
+    assert len(lines) == 5
+    assert all(float(line["at the end [cm]"]) < 3 for line in lines)
 
 
 @pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.stem)
