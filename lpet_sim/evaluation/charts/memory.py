@@ -17,6 +17,7 @@ from lpet_sim.evaluation.charts.style import (
     draw_band,
     log_error_axis,
     look,
+    plain_ticks,
     swept_axis,
 )
 from lpet_sim.evaluation.families import (
@@ -130,7 +131,7 @@ def plot_error_over_size(
     for axes, lines, (manner, _, _) in zip(panels, drawn, families, strict=True):
         _draw(axes, lines)
         axes.set(title=manner, ylabel=LABELS[metric], xscale="log")
-        axes.xaxis.set_major_formatter("{x:g}")
+        plain_ticks(axes.xaxis)
         axes.legend(loc="best")
     panels[-1].set_xlabel(f"{word} state size [landmarks]")
     return figure
