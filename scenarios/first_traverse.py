@@ -19,7 +19,7 @@ from lpet_sim.sweep.traverse import ImagesSpec, TraverseSpec
 
 def quick(
     spec: TraverseSpec,
-    waypoints_m: tuple[tuple[float, float], ...] = ((0.0, 0.0), (3.0, 0.5)),
+    waypoints_m: tuple[tuple[float, float], ...] = ((0.0, 0.0), (2.0, 2.0)),
     slip_s: float = 20.0,
 ) -> TraverseSpec:
     """Shorten a traverse to a few metres at twice the speed, and its images to a sixth."""

@@ -10,12 +10,14 @@ import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import typer
 import yaml
+from joblib.externals.loky import get_reusable_executor
 
 from lpet_sim.cli import app, main
 from lpet_sim.recording.reader import read_estimates, read_recording
@@ -38,6 +40,14 @@ _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _NAMED = re.compile(r"into `([\w.]+)`:\s*\Z")
 _EXIT = re.compile(r"# exit code (\d)\s*\Z")
 _COMMAND = re.compile(r"^\s*(?:\$ )?((?:lpet |python -m scenarios\.)[^\n]*)$", re.MULTILINE)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def workers_of_its_own() -> Iterator[None]:
+    """Let sweeps start their workers in the folder of a page, and leave none behind there."""
+    get_reusable_executor().shutdown(wait=True)
+    yield
+    get_reusable_executor().shutdown(wait=True)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +84,9 @@ def test_an_estimator_written_from_the_page_runs_beside_our_own(folder: Path) ->
         pytest.skip("there is no C compiler 'cc'")
     run_page(TUTORIALS[2], folder)
     rows = {str(row["variant"]): row for row in read_table(folder / "both" / "rows.parquet")[0]}
-    ours, written, in_c = (rows[name] for name in ("dead_reckoning", "straight", "straight_c"))
+    ours, written, in_c = (
+        rows[name] for name in ("dead_reckoning", "straight-scale1.0", "straight_c")
+    )
     assert written["failure"] == in_c["failure"]
     assert written["end_error_m"] == pytest.approx(in_c["end_error_m"], rel=1e-6)
     assert written["end_error_m"] > 2 * ours["end_error_m"]

@@ -191,7 +191,11 @@ def test_a_study_goes_on_makes_what_changed_and_takes_what_the_user_brings(
 def test_an_impossible_requirement_fails_honestly(studied: tuple[Path, Ended]) -> None:
     """A micrometre in a metre: the verdict is FAIL and, where asked for, the exit code 1."""
     folder, _ = studied
-    strict = TINY | {"requirement": {"start_m": 2.0, "position_ratio": 1e-6}, "draws": 4}
+    strict = TINY | {
+        "requirement": {"start_m": 2.0, "position_ratio": 1e-6},
+        "algorithms": [{"estimator": "frame_to_frame"}],
+        "draws": 4,
+    }
     ended = _study(folder, strict, "--check")
     assert ended.code == 1
     assert "FAIL: " in ended.out
