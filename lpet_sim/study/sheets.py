@@ -141,7 +141,8 @@ def sensor_sheet(candidate: Candidate) -> Sheet:
             cell = number(math.degrees(value), ".1f")
             rows.append((words(name.replace("_rad", "_deg")), cell))
         else:
-            rows.append((words(name), words(value) if isinstance(value, str) else number(value)))
+            shown = words(value) if isinstance(value, str) else number(value, ".4g")
+            rows.append((words(name), shown))
     headings = (Heading("parameter", words=True), Heading("value"))
     note = "The sensor that all algorithms ran with: sensor.yaml, which may be replaced."
     return Sheet("sensor", "Sensor", note, headings, tuple(rows))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -99,6 +100,7 @@ def test_a_study_ends_in_a_verdict(studied: tuple[Path, Ended]) -> None:
     told = json.loads((folder / "out" / "verdict.json").read_text())
     assert told["verdict"] == "NOT DECIDED"
     assert "NOT DECIDED: The goal is reachable from" in ended.out
+    assert re.search(r"resolution_px +│ +1024 ", ended.out)
     assert {one["variant"] for one in told["algorithms"]} == {"frame_to_frame", "slam"}
     assert all(one["whole"]["claim"]["runs"] == 4 for one in told["algorithms"])
     lines = told["algorithms"][0]["by_line"]
