@@ -247,6 +247,7 @@ def test_an_estimator_is_run_by_a_spec_and_under_a_name_of_its_own(
     assert_refused(lpet("estimate", run, *one, "--spec", spec), "'scal'", "valid keys")
     assert_refused(lpet("estimate", run, "--spec", spec), "one estimator")
     assert_refused(lpet("estimate", run, *one, "--estimator", "slam", "--name", "x"), "one only")
+    assert_refused(lpet("estimate", run, *one, "--name", ""), "is empty")
     assert run.read_bytes() == before
     spec.write_text("tilt_sigma_rad: 0.5\n")
     assert lpet("estimate", run, *one).code == 0

@@ -29,7 +29,7 @@ from lpet_sim.formats.sensor_yaml import (
     read_mapping,
 )
 from lpet_sim.recording.calibration import StereoCalibration
-from lpet_sim.recording.kitti import StereoFolder
+from lpet_sim.recording.kitti import StereoFolder, read_grey
 from lpet_sim.recording.streams import StereoImages
 
 
@@ -54,14 +54,31 @@ def read_cameras(root: Path) -> tuple[StereoCalibration | None, StereoImages | N
     images = _images(root)
     own = own_part(paths[0], mappings[0], StereoCalibration)
     if own is not None:
+        _hold_size(images, (own.width_px, own.height_px))
         for path, said, declared in zip(paths, mappings, camera_mappings(own, 0.0), strict=True):
             hold_to(path, said, declared)
         return own, images
     left, right = map(_eye, paths, mappings)
+    _hold_size(images, left.size_px)
     if are_rectified(left, right):
         return plain_stereo(left, right), images
     stereo, maps = rectified(left, right)
     return stereo, None if images is None else RectifiedImages(images, maps)
+
+
+def _hold_size(images: StereoFolder | None, size_px: tuple[int, int]) -> None:
+    """Hold the first pair to the size that is declared.
+
+    Raises:
+        RecordingError: It has another.
+    """
+    for path in () if images is None else (images.left[0], images.right[0]):
+        height, width = read_grey(path).shape
+        if (width, height) != size_px:
+            raise RecordingError(
+                f"{path} is {width} x {height} px, but {asl.SENSOR} declares a resolution of "
+                f"{size_px[0]} x {size_px[1]}"
+            )
 
 
 def from_stamp(images: StereoImages, start_ns: int) -> StereoImages:

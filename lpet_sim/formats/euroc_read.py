@@ -106,6 +106,10 @@ def _own(root: Path, held: _Held, declared: Calibration | None) -> Recording:
 
 def _foreign(root: Path, held: _Held, declared: Calibration | None) -> Recording:
     """Begin with the first image, or reading, of which the truth tells the pose."""
+    if held.imu is None and (root / asl.IMU).is_dir():
+        raise RecordingError(
+            f"{root / asl.IMU} has no {asl.DATA}; leave the folder out where there is no unit"
+        )
     start = first_stamp(root, (held.images, held.imu), held.body)
     stated = Calibration(
         stereo=held.stereo,
@@ -128,6 +132,8 @@ def _imu(root: Path) -> ImuStream | None:
     if not table.exists():
         return None
     stamps, values = read_csv(table, 6)
+    if not table.stat().st_size:
+        raise RecordingError(f"{table} is empty; leave the folder out where there is no unit")
     return ImuStream(stamps, values[:, :3].copy(), values[:, 3:].copy())
 
 
@@ -190,8 +196,14 @@ def _own_truth(root: Path, body: BodyTruth | None, start: int) -> Truth | None:
         counted = replace(counted, omega_body_radps=rate)
     table = folder / asl.WHEEL_TRUTH
     wheels = read_stream(table, start, WheelTruth) if table.exists() else None
-    events = _json(folder / asl.EVENTS, [])
-    return Truth(counted, wheels, tuple(Event(**event) for event in events))
+    return Truth(counted, wheels, _events(folder / asl.EVENTS))
+
+
+def _events(path: Path) -> tuple[Event, ...]:
+    try:
+        return tuple(Event(**event) for event in _json(path, []))
+    except TypeError as error:
+        raise RecordingError(f"{path} is no list of events: {error}") from None
 
 
 def _manifest(root: Path) -> Manifest:

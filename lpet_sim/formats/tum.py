@@ -27,6 +27,7 @@ from lpet_sim.recording.trajectory import Trajectory
 from lpet_sim.recording.truth import BodyTruth, Truth
 
 TRUTH_FILE = "truth.txt"
+_STAMP_MAX = 1 << 62
 _START = re.compile(r"#.*\blpet_start_s=([0-9.]+)")
 _WXYZ_TO_XYZW = [1, 2, 3, 0]
 _XYZW_TO_WXYZ = [3, 0, 1, 2]
@@ -124,7 +125,7 @@ def import_tum(path: Path) -> Recording:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text()
+        return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise RecordingError(f"cannot read {path}: {error}; give a file in TUM format") from None
 
@@ -135,6 +136,11 @@ def _pose(path: Path, number: int, line: str) -> tuple[int, list[float]]:
         stamp, row = stamp_of_text(first), [float(text) for text in rest]
     except (ValueError, RecordingError) as error:
         raise RecordingError(f"{path}, line {number}: {error}; numbers are expected") from None
+    if abs(stamp) > _STAMP_MAX:
+        raise RecordingError(
+            f"{path}, line {number}: {first} s is too large; times are in seconds, and these look "
+            "like nanoseconds"
+        )
     if len(row) != 7 or not np.all(np.isfinite(row)) or not np.linalg.norm(row[3:]) > 0:
         raise RecordingError(
             f"{path}, line {number}: 'time x y z qx qy qz qw' is expected, all finite, and a "

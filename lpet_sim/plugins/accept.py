@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 from lpet_sim.errors import EstimatorFaultError
 from lpet_sim.failures import BAD_COVARIANCE, MALFORMED, NO_OUTPUT, WRONG_FRAME, WRONG_LENGTH
 from lpet_sim.geometry import SE3
-from lpet_sim.recording.arrays import NS_PER_S, Array
+from lpet_sim.recording.arrays import NS_PER_S, Array, Ints
 from lpet_sim.recording.estimate import Estimate
-from lpet_sim.recording.streams import Measurements
+from lpet_sim.recording.streams import STREAMS, Measurements
 
 START_M: Final = 0.5
 START_RAD: Final = 0.35
 SPEED_MPS: Final = 0.5
 """A first pose further from the declared start than this, and than the rover may have driven since,
 is one in another frame. All are choices."""
+SLACK_NS: Final = NS_PER_S
+"""An estimate may begin before and end after what was measured by so much; a choice."""
 _ORTHONORMAL: Final = 1e-6
 _ROUNDING: Final = 1e-9
 
@@ -36,6 +38,7 @@ def accepted(estimate: Estimate, measurements: Measurements) -> Estimate:
     n = len(estimate.trajectory)
     if n == 0:
         raise EstimatorFaultError(NO_OUTPUT, "the estimate holds no pose")
+    _hold_times(estimate.trajectory.t_ns, measurements)
     _hold_poses(estimate.trajectory.T_world_body)
     _hold_covariance(estimate, n)
     for name, values in estimate.diagnostics.items():
@@ -44,6 +47,22 @@ def accepted(estimate: Estimate, measurements: Measurements) -> Estimate:
             raise EstimatorFaultError(WRONG_LENGTH, text)
     _hold_start(estimate, measurements)
     return estimate
+
+
+def _hold_times(t_ns: Ints, measurements: Measurements) -> None:
+    """Hold the times to those of what was measured."""
+    streams = [getattr(measurements, name) for name in STREAMS]
+    measured = [np.asarray(s.t_ns) for s in streams if s is not None and len(s.t_ns)]
+    if not measured:
+        return
+    first, last = min(0, *(t[0] for t in measured)), max(t[-1] for t in measured)
+    if t_ns[0] < first - SLACK_NS or t_ns[-1] > last + SLACK_NS:
+        said = [f"{t / NS_PER_S:.3f}" for t in (t_ns[0], t_ns[-1], first, last)]
+        text = (
+            f"the estimate spans {said[0]} to {said[1]} s, the measurements {said[2]} to {said[3]} "
+            "s: times are those of the measurements, nanoseconds since the start"
+        )
+        raise EstimatorFaultError(MALFORMED, text)
 
 
 def _hold_poses(T: SE3) -> None:

@@ -32,10 +32,13 @@ from lpet_sim.failures import (
 from lpet_sim.plugins.guard import Guard
 from lpet_sim.plugins.handover import read_measurements, write_estimate
 from lpet_sim.recording.estimate import Estimate
+from lpet_sim.recording.streams import STREAMS
 
 ESTIMATE: Final = "estimate.npz"
 FAULT: Final = "fault.json"
 _READER: Final = str(Path(lpet_sim.__file__).parent / "recording" / "reader.py")
+_LPET: Final = Path(lpet_sim.__file__).parent
+_NOT_ITS_OWN: Final = (*map(str, (_LPET, _LPET.parent / "estimators")), sys.prefix, sys.base_prefix)
 _KINDS: Final = (
     (TimesError, UNORDERED_TIMES),
     (LengthsError, WRONG_LENGTH),
@@ -64,8 +67,15 @@ def describe(value: str) -> dict[str, Any]:
         if parameter.default is parameter.empty:
             raise TypeError(f"parameter '{name}' has no default; give it one")
         parameters[name] = parameter.default
-    needs = [str(name) for name in getattr(kind, "needs", ())]
-    return {"needs": needs, "parameters": json.loads(json.dumps(parameters))}
+    needs = getattr(kind, "needs", ())
+    unknown = [need for need in (needs,) if isinstance(need, str)] or [
+        need for need in needs if need not in STREAMS
+    ]
+    if unknown:
+        raise TypeError(
+            f"'needs' is a tuple of some of {', '.join(STREAMS)}; {unknown[0]!r} is none of it"
+        )
+    return {"needs": list(needs), "parameters": json.loads(json.dumps(parameters))}
 
 
 def run(value: str, task: dict[str, Any], folder: Path) -> None:
@@ -110,7 +120,14 @@ def _fault(error: Exception) -> dict[str, str]:
     if isinstance(error, OSError) and error.errno == errno.EFBIG:
         return {"kind": OUTPUT_LIMIT, "text": text}
     kind = next((kind for type_, kind in _KINDS if isinstance(error, type_)), EXCEPTION)
-    return {"kind": kind, "text": text}
+    return {"kind": kind, "text": _place(error) + text}
+
+
+def _place(error: Exception) -> str:
+    """Name the last line of the plug-in's own code on the way to an error."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith((*_NOT_ITS_OWN, "<"))]
+    return f"{Path(own[-1].filename).name}, line {own[-1].lineno}: " if own else ""
 
 
 def main() -> None:

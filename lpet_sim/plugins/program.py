@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Annotated, Final, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from lpet_sim.errors import EstimatorFaultError, RecordingError, SpecError, TimesError
 from lpet_sim.failures import (
@@ -57,6 +58,19 @@ class ProgramSpec(LimitSpec):
     needs: tuple[str, ...] = ()
     with_images: bool = False
     code: str = ""
+
+    @field_validator("command", mode="before")
+    @classmethod
+    def _words(cls, command: object) -> object:
+        """See that the command is a list, and fills in nothing that there is not."""
+        if isinstance(command, str):
+            raise ValueError("give the program and each of its arguments as a list")
+        known = (MEASUREMENTS, ESTIMATE, COVARIANCE)
+        for word in command if isinstance(command, list | tuple) else ():
+            for found in re.findall(r"\{\w+\}", str(word)):
+                if found not in known:
+                    raise ValueError(f"there is no {found}; there are {', '.join(known)}")
+        return command
 
     @model_validator(mode="after")
     def _name_code(self) -> Self:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, Self
+from typing import Any, Final, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,6 +168,10 @@ class ImagesInMemory:
         return self.left[index], self.right[index]
 
 
+STREAMS: Final = ("imu", "wheels", "odometry", "sightings", "images")
+"""The streams that an estimator may need."""
+
+
 @dataclass(frozen=True)
 class Measurements:
     """All that an estimator may know.
@@ -194,8 +198,7 @@ class Measurements:
         Raises:
             RecordingError: A stream is absent.
         """
-        streams = ("imu", "wheels", "odometry", "sightings", "images")
-        present = [name for name in streams if getattr(self, name) is not None]
+        present = [name for name in STREAMS if getattr(self, name) is not None]
         for name in names:
             if name not in present:
                 hint = ""

@@ -24,7 +24,7 @@ from lpet_sim.progress import Progress, silent
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.recording.recording import Recording
-from lpet_sim.recording.streams import ImagesInMemory, Measurements
+from lpet_sim.recording.streams import STREAMS, ImagesInMemory, Measurements
 from lpet_sim.sensors.imu import ImuSpec
 from lpet_sim.sensors.landmark_spec import LandmarkSensorSpec
 from lpet_sim.sensors.wheels import WheelOdometrySpec
@@ -32,7 +32,6 @@ from lpet_sim.sweep.sensing import sense_recording
 from lpet_sim.sweep.simulate import simulate
 from lpet_sim.sweep.traverse import TraverseSpec
 
-STREAMS: Final = ("imu", "wheels", "odometry", "sightings", "images")
 ZERO_RATIO: Final = 1e-3
 ZERO_RAD: Final = 1e-3
 """Errors that count as none where nothing is noisy: share of the distance, and attitude [rad]."""

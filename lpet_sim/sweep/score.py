@@ -82,6 +82,8 @@ def estimate_recording(
     """
     if (fields is not None or called is not None) and len(names or ()) != 1:
         raise SpecError("a spec and a name are for one estimator: name one, and one only")
+    if called is not None and not called.strip():
+        raise SpecError("the name of an estimate is empty: give it one")
     asked = None if names is None else [build_estimator(name, dict(fields or {})) for name in names]
     recording = read_recording(path)
     measurements = recording.measurements

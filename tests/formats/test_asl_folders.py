@@ -150,6 +150,9 @@ DAMAGES = {
     "no layout": ("mav0/lpet_wheels0/data.csv", "1,2\n", "has no line '#lpet"),
     "no image": ("mav0/cam0/data.csv", "x,y\n", "a stamp and a file's name are expected"),
     "events that are none": ("mav0/lpet_truth0/events.json", "{", "is not valid JSON"),
+    "events that are a number": ("mav0/lpet_truth0/events.json", "1", "is no list of events"),
+    "an event of others": ("mav0/lpet_truth0/events.json", '[{"a": 1}]', "is no list of events"),
+    "an empty table": ("mav0/imu0/data.csv", "", "is empty; leave the folder out"),
 }
 
 
@@ -167,6 +170,28 @@ def test_what_is_wrong_with_a_folder_is_said_in_one_sentence(exported: Path, cas
     with pytest.raises(RecordingError, match=said) as refused:
         import_euroc(exported)
     assert "\n" not in str(refused.value)
+
+
+def test_images_of_another_size_than_declared_are_refused(exported: Path) -> None:
+    """With the size of the file and the one that is declared, from others as from us."""
+    for path in (exported / "mav0/cam0/sensor.yaml", exported / "mav0/cam1/sensor.yaml"):
+        path.write_text(path.read_text().replace("[64, 48]", "[752, 480]"))
+        if "lpet" in path.read_text():
+            path.write_text(path.read_text().replace("width_px: 64", "width_px: 752"))
+            path.write_text(path.read_text().replace("height_px: 48", "height_px: 480"))
+    for folder in (exported, as_of_others(exported)):
+        with pytest.raises(RecordingError, match=r"is 64 x 48 px, but .* of 752 x 480"):
+            import_euroc(folder)
+
+
+def test_a_unit_of_others_without_readings_is_refused(exported: Path) -> None:
+    """Its folder alone tells nothing; without the folder there is no unit."""
+    folder = as_of_others(exported)
+    (folder / "mav0/imu0/data.csv").unlink()
+    with pytest.raises(RecordingError, match=r"imu0 has no data.csv; leave the folder out"):
+        import_euroc(folder)
+    shutil.rmtree(folder / "mav0/imu0")
+    assert import_euroc(folder).measurements.imu is None
 
 
 def test_a_calibration_that_contradicts_itself_is_refused(exported: Path) -> None:

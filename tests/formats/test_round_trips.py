@@ -174,7 +174,12 @@ def test_the_memory_of_an_import_does_not_grow_with_its_images(name: str, tmp_pa
     peaks = []
     for count in (16, 16, 40):
         given, folder = small(), tmp_path / f"{count}_{len(peaks)}"
-        calibration = given.measurements.calibration
+        stereo = given.measurements.calibration.stereo
+        assert stereo is not None
+        size = {"width_px": _Made.SIDE, "height_px": _Made.SIDE}
+        calibration = given.measurements.calibration.model_copy(
+            update={"stereo": stereo.model_copy(update=size)}
+        )
         made = Recording(given.manifest, Measurements(calibration, images=_Made(count)))
         EXPORTS[name](made, folder, silent)
         tracemalloc.start()

@@ -98,6 +98,7 @@ def test_a_tum_file_of_others_begins_with_its_first_row(tmp_path: Path) -> None:
         ("1 0 0 0 0 0 0 one\n", "line 1: could not convert"),
         ("1 0 0 0 0 0 0 nan\n", "all finite"),
         ("1 0 0 0 0 0 0 0\n", "a quaternion that is not zero"),
+        ("1400000000000000000 0 0 0 0 0 0 1\n", "line 1: .* these look like nanoseconds"),
         ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "times must increase strictly"),
     ],
 )
@@ -106,6 +107,12 @@ def test_a_file_that_is_no_trajectory_is_refused(text: str, said: str, tmp_path:
     (tmp_path / "bad.txt").write_text(text)
     with pytest.raises(RecordingError, match=said):
         read_tum(tmp_path / "bad.txt")
+
+
+def test_a_mark_of_the_byte_order_is_passed_over(tmp_path: Path) -> None:
+    """As editors of Windows write one."""
+    (tmp_path / "bom.txt").write_text("\ufeff# time x\n1 0 0 0 0 0 0 1\n", encoding="utf-8")
+    assert len(read_tum(tmp_path / "bom.txt")) == 1
 
 
 def test_there_must_be_something_to_export(tmp_path: Path) -> None:

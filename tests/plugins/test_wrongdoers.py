@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +91,7 @@ def test_each_way_of_going_wrong_has_its_failure_and_the_other_rows_are_untouche
     assert without_timing(untouched) == without_timing(alone)
     assert all(row["failure"] not in FAULTS for row in alone)
     assert str(recording.parent) in failures["seeks_truth"][1]
+    assert re.match(r"wrongdoers.py, line \d+: ZeroDivisionError: ", failures["raises"][1])
 
 
 def test_a_plug_in_does_what_it_does_here(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,5 +112,9 @@ def test_what_is_no_estimator_is_told_in_a_sentence(monkeypatch: pytest.MonkeyPa
         build_estimator("straight:Crooked")
     with pytest.raises(SpecError, match=r"unknown key 'size'; valid keys are .*scale"):
         build_estimator("straight:Straight", {"size": 2})
+    module = "tests.plugins.wrongdoers"
+    for needs in ("OneName", "UnknownName"):
+        with pytest.raises(SpecError, match="'needs' is a tuple of some of imu, wheels"):
+            build_estimator(f"{module}:{needs}")
     with pytest.raises(UnknownNameError, match="choose one of dead_reckoning"):
         build_estimator("crooked")

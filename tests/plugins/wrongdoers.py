@@ -102,6 +102,18 @@ class Wrong:
         return _truth_in(self.place)
 
 
+class OneName(Wrong):
+    """Has a name where names are expected."""
+
+    needs = "wheels"  # type: ignore[assignment]
+
+
+class UnknownName(Wrong):
+    """Needs what is no stream."""
+
+    needs = ("wheel",)
+
+
 def _at_the_start(measurements: Measurements) -> Estimate:
     """Give an estimate with nothing wrong but that it stays where it was put."""
     assert measurements.wheels is not None
