@@ -68,13 +68,8 @@ def describe(value: str) -> dict[str, Any]:
             raise TypeError(f"parameter '{name}' has no default; give it one")
         parameters[name] = parameter.default
     needs = getattr(kind, "needs", ())
-    unknown = [need for need in (needs,) if isinstance(need, str)] or [
-        need for need in needs if need not in STREAMS
-    ]
-    if unknown:
-        raise TypeError(
-            f"'needs' is a tuple of some of {', '.join(STREAMS)}; {unknown[0]!r} is none of it"
-        )
+    if isinstance(needs, str) or any(need not in STREAMS for need in needs):
+        raise TypeError(f"'needs' is {needs!r}, not a tuple of some of {', '.join(STREAMS)}")
     return {"needs": list(needs), "parameters": json.loads(json.dumps(parameters))}
 
 

@@ -113,8 +113,8 @@ def test_what_is_no_estimator_is_told_in_a_sentence(monkeypatch: pytest.MonkeyPa
     with pytest.raises(SpecError, match=r"unknown key 'size'; valid keys are .*scale"):
         build_estimator("straight:Straight", {"size": 2})
     module = "tests.plugins.wrongdoers"
-    for needs in ("OneName", "UnknownName"):
-        with pytest.raises(SpecError, match="'needs' is a tuple of some of imu, wheels"):
-            build_estimator(f"{module}:{needs}")
+    for kind, needs in (("OneName", "'wheels'"), ("UnknownName", r"\('wheel',\)")):
+        with pytest.raises(SpecError, match=f"'needs' is {needs}, not a tuple of some of imu,"):
+            build_estimator(f"{module}:{kind}")
     with pytest.raises(UnknownNameError, match="choose one of dead_reckoning"):
         build_estimator("crooked")
