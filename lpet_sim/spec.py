@@ -96,8 +96,13 @@ def read_fields(path: Path) -> dict[str, Any]:
 
 
 def _first_problem(cls: type[BaseModel], error: ValidationError) -> str:
-    """Turn pydantic's first complaint into one sentence that names what is valid."""
-    problem = error.errors(include_url=False)[0]
+    """Turn a complaint of pydantic's into one sentence that names what is valid.
+
+    The first one, but an unknown key before all: what is missing may be what it should have been.
+    """
+    problems = error.errors(include_url=False)
+    unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
+    problem = (unknown or problems)[0]
     owner, inside, where = _follow(cls, problem["loc"])
     if problem["type"] == "extra_forbidden":
         return f"unknown key '{where}'; valid keys are {', '.join(owner.model_fields)}"

@@ -37,6 +37,12 @@ class Ball(Spec):
     radius_m: float = 1.0
 
 
+class Route(Spec):
+    """A spec with a key that must be there."""
+
+    goal_m: float
+
+
 class Device(Spec):
     """An outer spec."""
 
@@ -84,6 +90,14 @@ def test_an_unknown_key_inside_names_the_keys_of_the_inner_spec() -> None:
     assert "'lenses.1.focal'; valid keys are focal_px" in _sentence({"lenses": [{}, {"focal": 1}]})
     union = _sentence({"shape": {"kind": "ball", "edge_m": 1}})
     assert "unknown key 'shape.edge_m'; valid keys are kind, radius_m" in union
+
+
+def test_a_wrong_key_is_told_before_the_one_that_it_stands_for_is_missed() -> None:
+    """Whoever mistypes a key that must be there is told of what was typed."""
+    with pytest.raises(SpecError, match="unknown key 'goal'; valid keys are goal_m"):
+        Route.from_mapping({"goal": 3.0})
+    with pytest.raises(SpecError, match="'goal_m': Field required"):
+        Route.from_mapping({})
 
 
 def test_a_value_out_of_range_names_the_field_the_limit_and_the_value() -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -24,7 +24,14 @@ from lpet_sim.rover.model_spec import CameraMountSpec, MotorSpec, MountSpec, Rov
 OWN = "own/"
 """Stands before every name of the user's model."""
 
-_COLLIDES_GROUP = 3
+_COLLIDING: Final = {
+    "mass": 0.0,
+    "contype": 2,
+    "conaffinity": 1,
+    "condim": 3,
+    "priority": 1,
+    "group": 3,
+}
 _R_FLU_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 _TINY = 1e-9  # a surface velocity that is not zero makes MuJoCo heed it
 
@@ -154,12 +161,7 @@ def _add_tread(link: Any, wheel: Wheel, parts: Parts) -> None:
         size=[parts.radius_m, parts.width_m / 2, 0.0],
         pos=wheel.centre,
         quat=_to_axle(wheel.axle),
-        mass=0.0,
-        contype=2,
-        conaffinity=1,
-        condim=3,
-        priority=1,
-        group=_COLLIDES_GROUP,
+        **_COLLIDING,
         friction=[0.9, 0.005, 0.0001],
         solref=[0.015, 1.0],
         solimp=[0.75, 0.75, 0.001, 0.5, 2.0],
@@ -240,12 +242,7 @@ def _add_belly(body: Any, spec: RoverModelSpec) -> None:
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=list(spec.belly.half_size_m),
         pos=list(spec.belly.centre_m),
-        mass=0.0,
-        contype=2,
-        conaffinity=1,
-        condim=3,
-        priority=1,
-        group=_COLLIDES_GROUP,
+        **_COLLIDING,
         friction=[0.5, 0.005, 0.0001],
         solref=[0.02, 1.0],
     )
