@@ -21,7 +21,7 @@ from lpet_sim.cli_sweep import sweep
 from lpet_sim.cli_tradeoff import tradeoff
 from lpet_sim.errors import LpetError
 from lpet_sim.spec import read_fields
-from lpet_sim.terminal import bar, print_tables, wrote
+from lpet_sim.terminal import bar, print_tables, show_prints, wrote
 
 app = typer.Typer(
     name="lpet",
@@ -151,6 +151,7 @@ def estimate(
     """Run estimators on a recording and lay their estimates over it."""
     from lpet_sim.sweep.score import estimate_recording
 
+    show_prints()
     fields = None if spec is None else read_fields(spec)
     with bar(f"estimating {run.name}") as progress:
         estimates = estimate_recording(run, estimator or None, progress, fields=fields, called=name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -74,6 +75,11 @@ def either_bar(title: str) -> Iterator[tuple[Progress, Count]]:
             shown.update(task, completed=done, total=total, said=said)
 
         yield share, count
+
+
+def show_prints() -> None:
+    """Show on stderr what estimators that are not ours print, once each has ended."""
+    logging.getLogger("lpet_sim.plugins").setLevel(logging.INFO)
 
 
 def print_tables(tables: Iterable[Table]) -> None:

@@ -163,7 +163,7 @@ def _rows(requirement: Requirement) -> list[tuple[str, Callable[[RunResult], str
         ("end error [% of dist.]", lambda r: f"{100 * r.endpoint_ratio:.3f}"),
         (
             f"worst after {requirement.start_m:g} m [% of dist.]",
-            lambda r: f"{100 * r.worst_ratio:.3f}",
+            lambda r: _worst(r, requirement.start_m),
         ),
         ("end roll, pitch, yaw [deg]", lambda r: _degrees(r.endpoint_attitude_rad, "+.2f")),
         ("worst roll, pitch, yaw [deg]", lambda r: _degrees(r.worst_attitude_rad, ".2f")),
@@ -177,6 +177,12 @@ def _rms(result: RunResult) -> str:
         return "-"
     squares = np.sum(result.series.position_error_m**2, axis=1)
     return f"{math.sqrt(squares.mean()):.4f}"
+
+
+def _worst(result: RunResult, start_m: float) -> str:
+    """Give the largest share of the error; on a drive shorter than that it is the end's."""
+    short = " (at the end)" if result.distance_m < start_m else ""
+    return f"{100 * result.worst_ratio:.3f}{short}"
 
 
 def _drift(segment: SegmentDrift | None) -> str:

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from lpet_sim.errors import RecordingError
-from lpet_sim.formats.rows import Layout, each_row, pack, unpack
+from lpet_sim.formats.rows import Layout, each_row, in_order, pack, unpack
 from lpet_sim.recording.arrays import Array, ArrayStruct, Ints
 
 Struct = TypeVar("Struct", bound=ArrayStruct)
@@ -31,11 +31,17 @@ def write_csv(path: Path, header: Sequence[str], stamps: Ints, values: Array) ->
     _write_lines(path, [",".join(header)], _texts(stamps, values))
 
 
-def read_csv(path: Path, columns: int) -> tuple[Ints, Array]:
+def read_csv(path: Path, columns: int, repeats: bool = False) -> tuple[Ints, Array]:
     """Read stamps, Shape (n,), and the first numbers of each row, Shape (n, columns).
 
+    Args:
+        path: The file.
+        columns: How many numbers follow the stamp.
+        repeats: Whether stamps may come again, so that their order is left to the caller.
+
     Raises:
-        RecordingError: The file is missing, or a row has too few numbers or no numbers.
+        RecordingError: The file is missing, a row has too few numbers or no numbers, or times do
+            not increase.
     """
     stamps, values = array("q"), array("d")
     for number, line in enumerate(_lines(path), start=1):
@@ -43,7 +49,8 @@ def read_csv(path: Path, columns: int) -> tuple[Ints, Array]:
             stamp, row = _row(path, number, line, columns)
             stamps.append(stamp)
             values.extend(row)
-    return np.array(stamps, dtype=np.int64), np.array(values).reshape(-1, columns)
+    times = np.array(stamps, dtype=np.int64)
+    return times if repeats else in_order(path, times), np.array(values).reshape(-1, columns)
 
 
 def write_stream(path: Path, epoch_ns: int, struct: ArrayStruct) -> None:

@@ -164,7 +164,7 @@ def _sightings(folder: Path, start: int) -> SightingStream | None:
     if not (folder / asl.DATA).exists():
         return None
     stamps, drift = read_csv(folder / asl.SIGHTED_IMAGES, 1)
-    each, values = read_csv(folder / asl.DATA, 5)
+    each, values = read_csv(folder / asl.DATA, 5, repeats=True)
     counts = _counts(folder, stamps, each)
     return SightingStream(
         stamps - start,

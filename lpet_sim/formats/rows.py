@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lpet_sim.errors import TimesError
 from lpet_sim.recording.arrays import Array, ArrayStruct, Ints
 from lpet_sim.recording.columns import Column, put_together, take_apart
 
@@ -55,6 +57,26 @@ def each_row(*arrays: NDArray[Any]) -> Iterator[tuple[Any, ...]]:
     for start in range(0, len(arrays[0]), _ROWS_AT_ONCE):
         pieces = (array[start : start + _ROWS_AT_ONCE].tolist() for array in arrays)
         yield from zip(*pieces, strict=True)
+
+
+def in_order(path: Path, stamps: Ints) -> Ints:
+    """Give the stamps of a file's rows as they are, if each comes after the one before.
+
+    Args:
+        path: The file, for the message.
+        stamps: Stamps [ns], Shape (n,).
+
+    Raises:
+        TimesError: They do not increase.
+    """
+    late = np.flatnonzero(np.diff(stamps) <= 0)
+    if late.size:
+        row = int(late[0]) + 1
+        raise TimesError(
+            f"{path}, row {row + 1} of numbers: times must increase strictly, and "
+            f"{stamps[row]} ns does not come after {stamps[row - 1]} ns"
+        )
+    return stamps
 
 
 def pack(struct: ArrayStruct) -> tuple[Layout, Array]:

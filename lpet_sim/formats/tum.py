@@ -14,7 +14,7 @@ import numpy as np
 
 from lpet_sim.errors import RecordingError
 from lpet_sim.formats.clock import EPOCH_NS, seconds_text, stamp_of_text
-from lpet_sim.formats.rows import each_row
+from lpet_sim.formats.rows import each_row, in_order
 from lpet_sim.geometry import SE3
 from lpet_sim.outputs import whole_folder
 from lpet_sim.progress import Progress, silent, track
@@ -90,7 +90,8 @@ def read_tum(path: Path, epoch_ns: int | None = None) -> Trajectory:
             a comment, else the first row's.
 
     Raises:
-        RecordingError: The file is missing, empty, or not such a file.
+        RecordingError: The file is missing, empty, or not such a file, or its times do not
+            increase.
     """
     start, stamps, rows = epoch_ns, list[int](), list[list[float]]()
     for number, line in enumerate(_text(path).splitlines(), start=1):
@@ -103,9 +104,10 @@ def read_tum(path: Path, epoch_ns: int | None = None) -> Trajectory:
             rows.append(row)
     if not rows:
         raise RecordingError(f"{path} holds no pose; rows 'time x y z qx qy qz qw' are expected")
-    t_ns = np.array(stamps, dtype=np.int64) - (stamps[0] if start is None else start)
+    times = in_order(path, np.array(stamps, dtype=np.int64))
     values = np.array(rows)
-    return Trajectory(t_ns, SE3.from_quat_wxyz(values[:, 3:][:, _XYZW_TO_WXYZ], values[:, :3]))
+    poses = SE3.from_quat_wxyz(values[:, 3:][:, _XYZW_TO_WXYZ], values[:, :3])
+    return Trajectory(times - (stamps[0] if start is None else start), poses)
 
 
 def import_tum(path: Path) -> Recording:

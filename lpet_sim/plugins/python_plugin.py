@@ -169,7 +169,7 @@ class PythonPlugin:
 
 def _supervised(words: list[str], value: str, work: Path, limits: LimitSpec) -> None:
     """Run the child in a folder."""
-    command = [sys.executable, "-B", "-m", "lpet_sim.plugins.child", *words]
+    command = [sys.executable, "-u", "-B", "-m", "lpet_sim.plugins.child", *words]
     supervise(command, work, limits, _confinement(value), _environment(work))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import signal
 import subprocess
@@ -21,6 +22,7 @@ from lpet_sim.plugins.limits import MIB, LimitSpec
 
 SYSTEM: Final = ("/usr", "/lib", "/lib64", "/bin", "/sbin", "/etc", "/dev", "/proc", "/sys")
 """What every program needs to start."""
+_log = logging.getLogger(__name__)
 _LOOK_S: Final = 0.05
 _SAID_CHARS: Final = 500
 
@@ -52,8 +54,8 @@ def supervise(
 
     Args:
         command: Program and arguments.
-        folder: Its working folder, in which alone it may write; what it says goes into
-            ``said.txt`` there.
+        folder: Its working folder, in which alone it may write; what it prints goes into
+            ``said.txt`` there, and is logged as information when it has ended.
         limits: What it may use.
         confinement: What it may see.
         environment: All its variables.
@@ -79,6 +81,7 @@ def supervise(
         _watch(process, folder, limits, look)
     finally:
         _end(process)
+        _pass_on(said)
     look()
     _judge(process.returncode, said, folder, limits)
 
@@ -138,6 +141,13 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
+
+
+def _pass_on(said: Path) -> None:
+    """Log what a program printed, if anything."""
+    text = said.read_text(errors="replace").rstrip() if said.is_file() else ""
+    if text:
+        _log.info("what the estimator printed:\n%s", text)
 
 
 def _judge(code: int, said: Path, folder: Path, limits: LimitSpec) -> None:

@@ -48,6 +48,15 @@ def test_the_numbers_are_in_the_units_of_the_headings() -> None:
     assert "RMS error [m]" in text
 
 
+def test_a_drive_too_short_for_the_worst_share_shows_its_end_and_says_so() -> None:
+    """Of 4 m and 20 m, only one has anything after 5 m."""
+    short, long = straight(4.0, 201), straight(20.0, 201)
+    results = [evaluate(as_estimate(scaled(t, 1.005)), as_truth(t)) for t in (short, long)]
+    row = next(s for s in _text(result_table(results)).splitlines() if "worst after" in s)
+    assert row.count("0.500") == 2
+    assert row.count("0.500 (at the end)") == 1
+
+
 def test_the_verdict_names_every_line_with_its_limit_and_each_run_beside_it() -> None:
     """2 % against 1 % fails, 0.5 % passes."""
     truth = straight(20.0, 201)

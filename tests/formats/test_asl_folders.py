@@ -147,6 +147,7 @@ DAMAGES = {
     "no YAML": ("mav0/imu0/sensor.yaml", "a: [", "not valid YAML"),
     "a row too short": ("mav0/imu0/data.csv", "1,2,3\n", "line 1: a stamp and 6 numbers"),
     "no number": ("mav0/imu0/data.csv", "1,2,3,4,5,6,seven\n", "line 1: could not convert"),
+    "no order": ("mav0/imu0/data.csv", "2,2,3,4,5,6,7\n1,2,3,4,5,6,7\n", "data.csv, row 2 .* incr"),
     "no layout": ("mav0/lpet_wheels0/data.csv", "1,2\n", "has no line '#lpet"),
     "no image": ("mav0/cam0/data.csv", "x,y\n", "a stamp and a file's name are expected"),
     "events that are none": ("mav0/lpet_truth0/events.json", "{", "is not valid JSON"),

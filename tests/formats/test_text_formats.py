@@ -99,7 +99,7 @@ def test_a_tum_file_of_others_begins_with_its_first_row(tmp_path: Path) -> None:
         ("1 0 0 0 0 0 0 nan\n", "all finite"),
         ("1 0 0 0 0 0 0 0\n", "a quaternion that is not zero"),
         ("1400000000000000000 0 0 0 0 0 0 1\n", "line 1: .* these look like nanoseconds"),
-        ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "times must increase strictly"),
+        ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "bad.txt, row 2 .* must increase"),
     ],
 )
 def test_a_file_that_is_no_trajectory_is_refused(text: str, said: str, tmp_path: Path) -> None:
