@@ -11,6 +11,7 @@ from pydantic import Field
 from estimators import gaussian
 from estimators.fused_odometry import odometry_track
 from estimators.motion import OdometryTrack
+from estimators.odometry_steps import motion_between
 from estimators.view_pair import CameraStep, TwoViewSpec, ViewPair, estimate_step
 from lpet_sim.errors import RecordingError
 from lpet_sim.geometry import SE3
@@ -83,8 +84,9 @@ class FrameToFrame:
         moved = measurements.odometry is not None or measurements.wheels is not None
         odometry = odometry_track(measurements) if moved else None
         steps = self._steps(sightings, calibration, odometry)
-        start = _start_pose(measurements, odometry, int(sightings.t_ns[0]))
-        poses, covariance = chain(start, steps)
+        poses, covariance = chain(
+            *_start_pose(measurements, odometry, int(sightings.t_ns[0])), steps
+        )
         return Estimate(
             self.name,
             Trajectory(sightings.t_ns.copy(), poses),
@@ -117,9 +119,7 @@ class FrameToFrame:
     def _bridge(self, odometry: OdometryTrack | None, t_ns: tuple[int, int], last: SE3) -> BodyStep:
         """Step by the best odometry there is, or hold the last motion."""
         if odometry is not None:
-            known = odometry.trajectory.t_ns
-            within = np.clip(t_ns, known[0], known[-1])
-            return BodyStep(*odometry.between(int(within[0]), int(within[1])), None)
+            return BodyStep(*motion_between(odometry, *t_ns), None)
         size = self.spec.hold_sigma * last.log()
         sigma_m = max(float(np.linalg.norm(size[:3])), self.spec.hold_sigma_m)
         sigma_rad = max(float(np.linalg.norm(size[3:])), self.spec.hold_sigma_rad)
@@ -141,7 +141,7 @@ def declared_sightings(measurements: Measurements) -> tuple[SightingStream, Ster
     return sightings, calibration
 
 
-def chain(start: SE3, steps: list[BodyStep]) -> tuple[SE3, Array]:
+def chain(start: SE3, unsure: Array, steps: list[BodyStep]) -> tuple[SE3, Array]:
     """Chain steps onto the start, with the covariance of every pose.
 
     ``xi_k+1 = Ad(T_prev_curr^-1) xi_k + d_k``. Neighbouring steps share an image, and its noise
@@ -150,12 +150,13 @@ def chain(start: SE3, steps: list[BodyStep]) -> tuple[SE3, Array]:
 
     Args:
         start: Pose of the body at the first image.
+        unsure: Covariance of its right perturbation, Shape (6, 6).
         steps: Motion between the images, n.
 
     Returns:
         Poses, Shape (n + 1,), and covariances of their right perturbations, Shape (n + 1, 6, 6).
     """
-    poses, covariance = [start], [_START_VARIANCE * np.eye(6)]
+    poses, covariance = [start], [unsure]
     before: CameraStep | None = None
     for step in steps:
         F = step.T_prev_curr.inverse().adjoint()
@@ -204,11 +205,13 @@ def _in_body(seen: CameraStep, T_body_camera: SE3) -> BodyStep:
     return BodyStep(moved.T_prev_curr, moved.covariance(), moved)
 
 
-def _start_pose(measurements: Measurements, odometry: OdometryTrack | None, t_ns: int) -> SE3:
-    """Give the pose at the first image: the known start, moved on by odometry until then."""
+def _start_pose(
+    measurements: Measurements, odometry: OdometryTrack | None, t_ns: int
+) -> tuple[SE3, Array]:
+    """Give the pose at the first image by the known start and odometry, and its covariance."""
     start = measurements.calibration.T_world_body_start.se3()
+    given = np.full(6, _START_VARIANCE)
     if odometry is None:
-        return start
-    known = odometry.trajectory.t_ns
-    within = int(np.clip(t_ns, known[0], known[-1]))
-    return start @ odometry.between(int(known[0]), within)[0]
+        return start, gaussian.independent(given)
+    T_start_first, covariance = motion_between(odometry, int(odometry.trajectory.t_ns[0]), t_ns)
+    return start @ T_start_first, gaussian.with_noise(covariance, given)

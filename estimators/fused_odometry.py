@@ -29,7 +29,7 @@ from estimators.motion import (
 from estimators.rest import RestSpec, detect_rest
 from lpet_sim.errors import RecordingError
 from lpet_sim.geometry import SE3
-from lpet_sim.recording.arrays import Array
+from lpet_sim.recording.arrays import NS_PER_S, Array
 from lpet_sim.recording.calibration import ImuCalibration, WheelCalibration
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.streams import ImuStream, Measurements, WheelStream
@@ -56,6 +56,11 @@ class FusedOdometrySpec(MotionSpec):
     gate_probability: float = Field(default=0.999, gt=0, lt=1)
     gyro_bias_walk_radps_rts: float = Field(default=4e-9, ge=0)
     accel_bias_walk_mps2_rts: float = Field(default=8e-7, ge=0)
+
+
+_LATE_NS = NS_PER_S // 2
+_ROLLED_RAD = 0.05
+"""An inertial unit may begin this late, and wheels that roll less than that before it stand."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +141,13 @@ def declared_imu(measurements: Measurements) -> tuple[ImuStream, ImuCalibration]
 
 
 def _covered_by(wheels: WheelStream, imu: ImuStream) -> WheelStream:
-    """Keep the wheel readings up to the last inertial sample."""
+    """Keep the wheel readings up to the last inertial sample; none may roll before the first."""
+    before = int(np.searchsorted(wheels.t_ns, imu.t_ns[0] - _LATE_NS))
+    if before > 1 and np.ptp(wheels.drive_angle_rad[:before], axis=0).max() > _ROLLED_RAD:
+        raise RecordingError(
+            f"the wheels roll before the first inertial sample at {imu.t_ns[0]} ns, so that their "
+            "turns are not known; give a recording of which both begin together or at rest"
+        )
     kept = int(np.searchsorted(wheels.t_ns, imu.t_ns[-1], side="right"))
     if kept < 2:
         raise RecordingError(

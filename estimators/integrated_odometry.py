@@ -36,34 +36,45 @@ class IntegratedOdometry:
     needs: ClassVar[tuple[str, ...]] = ("odometry",)
 
     def estimate(self, measurements: Measurements) -> Estimate:
-        """Chain the increments, ``T_k = T_k-1 exp(u_k)``; see `Estimator`."""
+        """Chain the increments, ``T_k = T_k-1 exp(u_k)``; see `Estimator`.
+
+        Where an inertial unit is declared its turn-on bias stays in the increments all the way.
+        """
         odometry = declared_odometry(measurements)
         trajectory = stream_odometry(measurements).trajectory
         scale_sigma = np.array(odometry.scale_sigma[0])
+        imu = measurements.calibration.imu
         covariance = _covariances(
-            np.array(odometry.twist), np.array(odometry.variance), scale_sigma
+            np.array(odometry.twist),
+            np.array(odometry.variance),
+            np.diff(odometry.t_s, prepend=0.0),
+            scale_sigma,
+            0.0 if imu is None else imu.gyro_bias_radps,
         )
         return Estimate(self.name, trajectory, covariance, {})
 
 
 @njit(cache=True)
-def _covariances(twists: Array, variance: Array, scale_sigma: Array) -> Array:
-    """Propagate (xi, scale), Shape (7,), along the steps; give the covariance of xi, (n, 6, 6).
+def _covariances(
+    twists: Array, variance: Array, seconds: Array, scale_sigma: Array, rate_sigma: float
+) -> Array:
+    """Propagate (xi, scale, rate of turn), Shape (10,), along the steps; give xi's, (n, 6, 6).
 
-    One scale error s of unit variance, shared by all steps and parts: ``du = s sigma u``. The start
-    is given: a micrometre and a microradian stand for it, so that every covariance is positive
-    definite.
+    One scale error s of unit variance, shared by all steps and parts, and one rate of turn r:
+    ``du = s sigma u + (0, r dt)``. The start is given: a micrometre and a microradian stand for it,
+    so that every covariance is positive definite.
     """
-    start = np.full(7, 1e-12)
-    start[6] = 1.0
+    start = np.full(10, 1e-12)
+    start[6], start[7:] = 1.0, rate_sigma**2
     P = gaussian.independent(start)
     out = np.zeros((len(twists), 6, 6))
     out[0] = P[:6, :6]
-    added = np.zeros(7)
+    added = np.zeros(10)
     for k in range(1, len(twists)):
-        F = np.eye(7)
+        F = np.eye(10)
         F[:6, :6], by_twist = step_jacobians(twists[k])
         F[:6, 6] = by_twist @ (scale_sigma * twists[k])
+        F[:6, 7:] = by_twist[:, 3:] * seconds[k]
         added[:6] = variance[k]
         P = gaussian.propagate(P, F, gaussian.independent(added))
         out[k] = P[:6, :6]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from estimators import gaussian
 from estimators.fused_odometry import FusedOdometrySpec, odometry_track
 from estimators.motion import OdometryTrack
 from lpet_sim.geometry import SE3
@@ -18,7 +19,8 @@ def image_odometry(
     """Give the motion between given times, such as those of the images.
 
     It comes from the recording's own odometry if there is one, else from wheels and inertial unit,
-    else from wheels alone. Before its first and after its last reading the rover is held to stand.
+    else from wheels alone. Before its first and after its last reading the rover is held to stand,
+    with the error of having gone as fast as it ever did.
 
     Args:
         measurements: Streams and declared calibration.
@@ -38,6 +40,40 @@ def image_odometry(
     return _of_track(odometry_track(measurements, spec), t_ns)
 
 
+def motion_between(track: OdometryTrack, t_prev_ns: int, t_curr_ns: int) -> tuple[SE3, Array]:
+    """Give a step by odometry at any times; see `image_odometry` for those it does not reach.
+
+    Returns:
+        ``T_prev_curr`` and the covariance of its right perturbation, Shape (6, 6).
+    """
+    edges_ns = np.array([t_prev_ns, t_curr_ns])
+    known = track.trajectory.t_ns
+    within = np.clip(edges_ns, known[0], known[-1])
+    T_prev_curr, covariance = track.between(int(within[0]), int(within[1]))
+    unseen = _unseen_variance(track.trajectory, edges_ns)[0]
+    return T_prev_curr, gaussian.with_noise(covariance, unseen)
+
+
+def _unseen_variance(track: Trajectory, edges_ns: Ints) -> Array:
+    """Give the variance of ``xi`` for the parts of steps that odometry does not reach, (n, 6)."""
+    known = track.t_ns
+    within = np.clip(edges_ns, known[0], known[-1])
+    unseen_s = (np.abs(np.diff(edges_ns)) - np.abs(np.diff(within))) / NS_PER_S
+    if not unseen_s.any():
+        return np.zeros((len(unseen_s), 6))
+    return (unseen_s[:, None] * np.repeat(_fastest(track), 3)) ** 2
+
+
+def _fastest(track: Trajectory) -> Array:
+    """Give the highest speed [m/s] and rate of turn [rad/s] over about a second, Shape (2,)."""
+    first, last = int(track.t_ns[0]), int(track.t_ns[-1])
+    t_ns = np.linspace(first, last, max(2, (last - first) // NS_PER_S + 1)).astype(np.int64)
+    poses = track.at(t_ns)
+    steps = (poses[:-1].inverse() @ poses[1:]).log().reshape(-1, 2, 3)
+    speeds = np.linalg.norm(steps, axis=2) / np.diff(t_ns)[:, None] * NS_PER_S
+    return np.asarray(speeds.max(axis=0))
+
+
 def chained(stream: OdometryStream, start: SE3) -> SE3:
     """Chain increments onto the pose at the first time; gives poses, Shape (n,)."""
     poses = [start]
@@ -54,7 +90,9 @@ def _of_track(track: OdometryTrack, t_ns: Ints) -> OdometryStream:
     seconds = (within - known[0]) / NS_PER_S
     spent = np.outer(rolled_m, track.variance_per_m) + np.outer(seconds, track.variance_per_s)
     poses = track.trajectory.at(np.concatenate([known[:1], within]))
-    return _increments(t_ns, poses, spent, track.scale_sigma)
+    edges_ns = np.concatenate([known[:1], t_ns])
+    beside = _unseen_variance(track.trajectory, edges_ns)
+    return _increments(t_ns, poses, spent, beside, track.scale_sigma)
 
 
 def _resampled(stream: OdometryStream, t_ns: Ints) -> OdometryStream:
@@ -64,11 +102,14 @@ def _resampled(stream: OdometryStream, t_ns: Ints) -> OdometryStream:
     summed = np.cumsum(stream.variance, axis=0)
     spent = np.stack([np.interp(within, known, summed[:, i]) for i in range(6)], axis=1)
     poses = chain.at(np.concatenate([known[:1], within]))
-    return _increments(t_ns, poses, spent, stream.scale_sigma[0])
+    beside = _unseen_variance(chain, np.concatenate([known[:1], t_ns]))
+    return _increments(t_ns, poses, spent, beside, stream.scale_sigma[0])
 
 
-def _increments(t_ns: Ints, poses: SE3, spent: Array, scale_sigma: Array) -> OdometryStream:
-    """Give the steps between n + 1 poses and what each adds to the variance spent so far."""
+def _increments(
+    t_ns: Ints, poses: SE3, spent: Array, beside: Array, scale_sigma: Array
+) -> OdometryStream:
+    """Give the steps between n + 1 poses, with what each adds to the variance spent and beside."""
     twist = (poses[:-1].inverse() @ poses[1:]).log()
-    variance = np.diff(spent, axis=0, prepend=np.zeros((1, 6)))
+    variance = np.diff(spent, axis=0, prepend=np.zeros((1, 6))) + beside
     return OdometryStream(np.array(t_ns), twist, variance, np.tile(scale_sigma, (len(t_ns), 1)))

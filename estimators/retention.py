@@ -1,6 +1,7 @@
 """Who enters the state of the SLAM filter and who leaves it: the paper's policies.
 
-A policy sees counters alone. Anchors are pinned: no policy but their own lets them go.
+A policy sees counters alone. Anchors are pinned: no policy but their own lets them go (and
+sightings that do not fit, which are no policy).
 """
 
 from __future__ import annotations

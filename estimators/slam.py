@@ -264,7 +264,7 @@ class SlamRun:
 def odometry_step(odometry: OdometryStream, k: int) -> Step:
     """Give the motion to an image by odometry and what is unsure of it."""
     lasting, twist = np.zeros((LASTING, 6)), odometry.twist[k]
-    seconds = (odometry.t_ns[k] - odometry.t_ns[k - 1]) / NS_PER_S if k else 0.0
+    seconds = (odometry.t_ns[k] - (odometry.t_ns[k - 1] if k else 0)) / NS_PER_S
     lasting[:3, 3:] = seconds * np.eye(3)
     lasting[3] = odometry.scale_sigma[k] * twist
     return Step(twist, np.diag(np.sqrt(odometry.variance[k])), lasting)

@@ -15,6 +15,8 @@ FREE, KEYFRAME, ODOMETRY = -1, -2, -3
 """What stands in place of a landmark's id in a slot that is free, or of a keyframe or odometry."""
 LASTING = 4
 """Lasting errors of odometry, in the first two slots: its rate of turn and its scale."""
+VEHICLE = POSE + 6
+"""Rows of the state before the landmarks: the pose, and the two slots of odometry."""
 
 
 class LandmarkMap:

@@ -98,7 +98,8 @@ class SlamSpec(Spec):
     Attributes:
         retention: Who enters and who leaves: `KeepAll`, `TimeToLive` or `BoundedQueue`.
         coupling: ``coupled`` keeps the full covariance; ``decoupled`` drops all correlations but
-            those of the pose and of each landmark within themselves after every update;
+            those within the vehicle (pose and odometry's lasting errors) and within each landmark
+            after every update;
             ``decoupled_pose_kept`` drops those between landmarks alone.
         anchors: Pins landmarks mapped at standstill (the paper's observable form); None does not.
         formulation: ``standard`` linearises at the latest estimate, ``first_estimates`` at the
@@ -140,7 +141,7 @@ class SlamSpec(Spec):
     keyframe_rad: Annotated[float, Field(gt=0.0)] = 0.2
     association_check: Literal["none", "one_point_ransac"] = "one_point_ransac"
     gate_probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.999
-    sightings_min: Annotated[int, Field(ge=0)] = 3
+    sightings_min: Annotated[int, Field(ge=1)] = 3
     sightings_max: Annotated[int, Field(ge=1)] = 120
     far_disparity_sigmas: Annotated[float, Field(ge=0.0)] = 5.0
     misfits_max: Annotated[int, Field(ge=1)] = 3

@@ -10,7 +10,7 @@ from estimators import gaussian, gaussian_blocks, slam_gate, slam_hosts, slam_ke
 from estimators.jacobians import hat, se3_exp
 from estimators.observation import camera_vector, transfer
 from estimators.slam_kernels import FIRST_ESTIMATES, RELATIVE, RIGHT_INVARIANT, STANDARD
-from estimators.slam_map import FREE, LASTING, POSE, LandmarkMap
+from estimators.slam_map import FREE, LASTING, POSE, VEHICLE, LandmarkMap
 from estimators.slam_spec import SlamSpec
 from estimators.slam_values import Innovations, Joint, Step
 from lpet_sim.geometry import SE3
@@ -277,8 +277,12 @@ class SlamState:
             self.landmarks.leave(int(slot))
 
     def decouple(self, keep_pose: bool) -> None:
-        """Drop the correlations between landmarks, and those with the pose unless they are kept."""
-        gaussian_blocks.drop_correlations(self.P, POSE, keep_pose)
+        """Drop the correlations between landmarks, and those with the pose unless they are kept.
+
+        What odometry's lasting errors have in common with the pose always stays, and goes with the
+        pose in what they have in common with landmarks.
+        """
+        gaussian_blocks.drop_correlations(self.P, VEHICLE, keep_pose)
 
     def in_hosts(self) -> tuple[Array, Array]:
         """Give disparity [px] and summed variance [px^2] of landmarks in their hosts, (c,)."""

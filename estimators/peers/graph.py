@@ -63,9 +63,9 @@ class GraphMaker:
         return int(self.gtsam.symbol("l", number))
 
     def prior(self) -> Any:
-        """Tie the first pose to the given start."""
-        s = self.spec
-        sigmas = np.repeat([s.prior_sigma_rad, s.prior_sigma_m], 3)
+        """Tie the first pose to the given start, less sure by the odometry from there."""
+        given = np.repeat([self.spec.prior_sigma_rad, self.spec.prior_sigma_m], 3)
+        sigmas = np.hypot(given, self.inputs.first_sigma[[3, 4, 5, 0, 1, 2]])
         noise = self.gtsam.noiseModel.Diagonal.Sigmas(sigmas)
         start = to_pose3(self.inputs.T_world_body_start)
         return self.gtsam.PriorFactorPose3(self.pose_key(0), start, noise)

@@ -36,6 +36,12 @@ class PeerInputs:
     odometry: OdometryStream
     T_world_body_start: SE3
 
+    @property
+    def first_sigma(self) -> Array:
+        """Error of the pose at the first image by the odometry until then, 1 sigma, Shape (6,)."""
+        along = self.odometry.scale_sigma[0] * self.odometry.twist[0]
+        return np.asarray(np.sqrt(self.odometry.variance[0] + along**2))
+
     def motion(self, image: int) -> tuple[SE3, Array]:
         """Give the motion to an image from the one before it.
 

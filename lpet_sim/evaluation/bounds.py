@@ -108,7 +108,8 @@ def pose_bounds(
         A bound for each of the images.
 
     Raises:
-        RecordingError: Poses, sightings and odometry are not at the same times.
+        RecordingError: Poses, sightings and odometry are not at the same times, or the sightings
+            declare tracks that slide, of which this bound knows nothing.
     """
     _check(truth_poses, sightings, odometry)
     wanted = np.arange(1, len(sightings)) if at is None else np.asarray(at, dtype=np.int64)
@@ -132,6 +133,10 @@ def _check(truth_poses: SE3, sightings: SightingStream, odometry: OdometryStream
     if len(truth_poses) != len(sightings):
         raise RecordingError(
             f"{len(truth_poses)} true poses and {len(sightings)} images: give the pose of each"
+        )
+    if np.any(sightings.drift_px > 0):
+        raise RecordingError(
+            "there is no bound for tracks that slide: the sightings must declare a drift_px of 0"
         )
     if odometry is not None and not np.array_equal(odometry.t_ns, sightings.t_ns):
         raise RecordingError("a bound needs odometry at the times of the images")

@@ -68,13 +68,18 @@ class NoiseFit:
             Lange, Little, Taylor, Robust statistical modeling using the t distribution (1989),
             appendix B.
         """
-        factor = (self.tails + 5.0) / (self.tails + 3.0)
-        return np.sqrt(self.variance_px2 * factor)
+        return np.sqrt(self.variance_px2 * self._gaussian_share)
+
+    @property
+    def _gaussian_share(self) -> float:
+        """Variance of the Gaussian noise over the squared scale of Student's t."""
+        return (self.tails + 5.0) / (self.tails + 3.0)
 
     @property
     def sigma_se_px(self) -> Array:
-        """Standard errors of `sigma_px` by the delta rule, Shape (4,)."""
-        return np.asarray(self.variance_se_px2 / (2.0 * np.maximum(self.sigma_px, 1e-3)))
+        """Standard errors of `sigma_px` by the delta rule, the tails held known, Shape (4,)."""
+        spread = self._gaussian_share * self.variance_se_px2
+        return np.asarray(spread / (2.0 * np.maximum(self.sigma_px, 1e-3)))
 
     @property
     def weight(self) -> Array:

@@ -41,6 +41,8 @@ class EvaluationSpec(Spec):
         start_m: Distance after which an error is measured as a share of the distance [m].
         segment_lengths_m: Lengths of the segments of the drift [m].
         min_completion: A run that covers a smaller share of the traverse is incomplete.
+        max_gap_m: Between poses that are farther apart the traverse is not covered, nor before a
+            first pose that comes later [m].
         max_error_ratio: A run with a larger endpoint error has diverged.
         max_lost_images: More images in a row bridged without vision means lost.
     """
@@ -48,6 +50,7 @@ class EvaluationSpec(Spec):
     start_m: float = Field(default=5.0, ge=0)
     segment_lengths_m: tuple[float, ...] = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
     min_completion: float = Field(default=0.99, ge=0, le=1)
+    max_gap_m: float = Field(default=5.0, gt=0)
     max_error_ratio: float = Field(default=0.1, gt=0)
     max_lost_images: int = Field(default=50, ge=0)
 
@@ -128,7 +131,7 @@ def evaluate(
     if not len(finite.trajectory):
         return failed(estimate.name, NOT_FINITE, "no pose of the estimate is finite")
     series = _series(finite, truth, anchor_t_ns)
-    distance_m, completion = _completion(series, truth.trajectory, last_image_t_ns)
+    distance_m, completion = _completion(series, truth.trajectory, last_image_t_ns, spec.max_gap_m)
     begin = series.t_ns[0]
     scored = Trajectory(
         finite.trajectory.t_ns[finite.trajectory.t_ns >= begin],
@@ -186,19 +189,21 @@ def _series(estimate: Estimate, truth: Truth, anchor_t_ns: int | None) -> ErrorS
 
 
 def _completion(
-    series: ErrorSeries, truth: Trajectory, last_image_t_ns: int | None
+    series: ErrorSeries, truth: Trajectory, last_image_t_ns: int | None, max_gap_m: float
 ) -> tuple[float, float]:
     """Give the length of the scored traverse [m] and the share that the estimate covers.
 
     A traverse that does not move is covered by the share of its time.
     """
+    gaps_m = np.diff(series.distance_m, prepend=0.0)
+    missed_m = float(gaps_m[gaps_m > max_gap_m].sum())
     driven = distance_driven_m(truth)
     begin = np.interp(series.t_ns[0], truth.t_ns, driven) - series.distance_m[0]
     total = float(driven[-1] - begin)
     if last_image_t_ns is not None and series.t_ns[-1] == last_image_t_ns:
-        return total, 1.0
+        return total, 1.0 - missed_m / total if total > 0 else 1.0
     if total > 0:
-        return total, float(series.distance_m[-1] / total)
+        return total, float((series.distance_m[-1] - missed_m) / total)
     span = int(truth.t_ns[-1] - truth.t_ns[0])
     return total, float((series.t_ns[-1] - truth.t_ns[0]) / span) if span else 1.0
 

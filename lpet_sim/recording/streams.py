@@ -94,10 +94,11 @@ class SightingStream(ArrayStruct):
         return frozenset({"offsets", *_SIGHTED})
 
     def __post_init__(self) -> None:
-        """Check the offsets against the rows.
+        """Check the offsets against the rows, and the rows themselves.
 
         Raises:
-            RecordingError: Offsets and rows do not fit together.
+            RecordingError: Offsets and rows do not fit together, a number is not finite, a noise
+                is not above zero, or a landmark is twice in an image.
         """
         if len(self.drift_px) == 0:
             object.__setattr__(self, "drift_px", np.zeros(len(self.t_ns)))
@@ -108,6 +109,23 @@ class SightingStream(ArrayStruct):
         fits = fits and self.offsets[-1] == rows and bool(np.all(counts >= 0))
         if not fits or len(self.stereo_px) != rows or len(self.sigma_px) != rows:
             raise RecordingError("SightingStream: offsets must run from 0 to the number of rows")
+        self._check_rows(counts)
+
+    def _check_rows(self, counts: Ints) -> None:
+        sound = np.isfinite(self.stereo_px).all(axis=1) & np.isfinite(self.sigma_px)
+        if not np.all(sound & (self.sigma_px > 0)):
+            raise RecordingError(
+                "SightingStream: image coordinates must be finite, and sigma_px above zero"
+            )
+        image = np.repeat(np.arange(len(self.t_ns)), counts)
+        order = np.lexsort((self.landmark_id, image))
+        ids, image = self.landmark_id[order], image[order]
+        twice = np.flatnonzero((np.diff(ids) == 0) & (np.diff(image) == 0))
+        if twice.size:
+            raise RecordingError(
+                f"SightingStream: landmark {ids[twice[0]]} is seen twice in the image at "
+                f"{self.t_ns[image[twice[0]]]} ns; each may be there once"
+            )
 
     def rows(self, image: int) -> slice:
         """Give the rows of one image."""

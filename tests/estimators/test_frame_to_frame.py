@@ -242,5 +242,5 @@ def test_a_recording_without_sightings_is_refused_in_one_sentence() -> None:
 
 def test_a_chain_without_steps_is_its_start() -> None:
     """One image gives one pose."""
-    poses, covariance = chain(SE3.identity(), [])
+    poses, covariance = chain(SE3.identity(), np.eye(6), [])
     assert len(poses) == len(covariance) == 1

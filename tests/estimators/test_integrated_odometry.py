@@ -12,7 +12,7 @@ from estimators.fused_odometry import odometry_track
 from lpet_sim.errors import RecordingError
 from lpet_sim.evaluation.consistency import anees
 from lpet_sim.geometry import SE3
-from lpet_sim.recording.calibration import Calibration, PoseSpec
+from lpet_sim.recording.calibration import Calibration, ImuCalibration, PoseSpec
 from lpet_sim.recording.streams import Measurements, OdometryStream, SightingStream
 from lpet_sim.rng import stream
 from tests.recording import synthetic
@@ -50,7 +50,11 @@ def measured(seed: int, told: float = 1.0) -> Measurements:
 
 def nees_end(seed: int, told: float) -> float:
     """Give the NEES of the pose at the end."""
-    measurements = measured(seed, told)
+    return nees_of(measured(seed, told))
+
+
+def nees_of(measurements: Measurements) -> float:
+    """Give the NEES of the pose at the end of the curve."""
     estimate = build_estimator("odometry").estimate(measurements)
     start = measurements.calibration.T_world_body_start.se3()
     true = start
@@ -65,6 +69,31 @@ def test_its_covariance_is_what_it_errs(told: float, consistent: bool) -> None:
     """White noise and shared scale: NEES inside its band, and outside where told another noise."""
     found = anees([nees_end(seed, told) for seed in range(100)], 6)
     assert found.is_consistent == consistent
+
+
+RATE = 3e-3
+
+
+def test_a_declared_gyro_is_held_to_turn_it_all_the_way() -> None:
+    """A rate of turn of its own in each of 100 runs: consistent where the unit declares it."""
+    none = dict.fromkeys(("accel_bias_mps2", "accel_quantum_mps"), 0.0)
+    walks = dict.fromkeys(("gyro_random_walk_radps_rthz", "accel_random_walk_mps2_rthz"), 0.0)
+    unit = ImuCalibration(
+        rate_hz=10.0, T_body_imu=PoseSpec(), gyro_bias_radps=RATE, **none, **walks
+    )
+    found = {True: list[float](), False: list[float]()}
+    for seed in range(100):
+        given = measured(seed)
+        assert given.odometry is not None
+        rate = np.r_[0, 0, 0, RATE * stream(seed, "test", "rate").normal(size=3)]
+        twist = given.odometry.twist - 0.1 * rate
+        twist[0] = 0.0
+        turned = replace(given, odometry=replace(given.odometry, twist=twist))
+        declared = replace(turned, calibration=turned.calibration.model_copy(update={"imu": unit}))
+        for says, each in ((True, declared), (False, turned)):
+            found[says].append(nees_of(each))
+    assert anees(found[True], 6).is_consistent
+    assert not anees(found[False], 6).is_consistent
 
 
 def test_without_noise_it_ends_where_the_rover_does() -> None:

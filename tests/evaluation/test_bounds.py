@@ -306,3 +306,10 @@ def test_what_is_not_at_the_same_times_is_refused(run: SCurveRun) -> None:
     shifted = replace(run.odometry, t_ns=run.odometry.t_ns + 1)
     with pytest.raises(RecordingError, match="times of the images"):
         end_bound(run.poses, run.sightings, CAMERA, shifted)
+
+
+def test_tracks_that_slide_have_no_bound(run: SCurveRun) -> None:
+    """Their noise is not white, and the bound would promise what cannot be had."""
+    slid = replace(run.sightings, drift_px=np.full(len(run.sightings), 0.2))
+    with pytest.raises(RecordingError, match="no bound for tracks that slide"):
+        end_bound(run.poses, slid, CAMERA, run.odometry)

@@ -112,6 +112,25 @@ def test_an_estimate_that_ends_with_the_last_image_is_complete() -> None:
     assert early.failure == "incomplete"
 
 
+@pytest.mark.parametrize(
+    ("rows", "share"),
+    [
+        (np.r_[0:31, 60:101], 0.7),
+        (np.arange(90, 101), 0.1),
+        (np.r_[0:38, 41:101], 1.0),
+    ],
+    ids=["hole", "late", "short gap"],
+)
+def test_a_hole_in_an_estimate_is_not_covered(rows: np.ndarray, share: float) -> None:
+    """100 m in metres: 30 to 60 m left out, or all before 90 m, or less than the longest gap."""
+    truth = straight(100.0, 101)
+    cut = Trajectory(truth.t_ns[rows], truth.T_world_body[rows])
+    for last in (None, int(truth.t_ns[-1])):
+        result = evaluate(as_estimate(cut), as_truth(truth), last_image_t_ns=last)
+        assert result.completion == pytest.approx(share)
+        assert result.failure == (None if share == 1.0 else "incomplete")
+
+
 def test_poses_that_are_not_finite_end_the_estimate() -> None:
     """The part before is scored, the failure is named."""
     truth = straight(20.0, 201)

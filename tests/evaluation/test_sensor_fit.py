@@ -62,6 +62,16 @@ def test_white_noise_comes_back_within_four_standard_errors(errors: Errors) -> N
     assert np.all(fit.sigma_se_px[:3] < 0.015 * fit.sigma_px[:3])
 
 
+@pytest.mark.parametrize("tails", [1.0, 3.0, 100.0])
+def test_the_standard_errors_are_those_of_the_delta_rule(tails: float) -> None:
+    """By finite differences of the noise by its variance, whatever the tails."""
+    fit = replace(measured(CLEAN), tails=tails)
+    step = 1e-6 * fit.variance_px2
+    ahead, behind = (replace(fit, variance_px2=fit.variance_px2 + s) for s in (step, -step))
+    slope = (ahead.sigma_px - behind.sigma_px) / (2.0 * step)
+    np.testing.assert_allclose(fit.sigma_se_px[:3], (slope * fit.variance_se_px2)[:3], rtol=1e-6)
+
+
 def test_a_fixed_error_is_told_from_white_noise() -> None:
     """That of the landmarks comes back where it is, and is small where it is none."""
     fixed = measured(SYSTEMATIC)

@@ -45,6 +45,16 @@ def test_times_must_increase_strictly() -> None:
             WheelStream(np.array(t_ns), np.zeros((3, 6)), np.zeros((3, 6)))
 
 
+def test_a_landmark_twice_in_an_image_and_numbers_that_are_none_are_refused() -> None:
+    """Before an estimator trips over them; the same landmark in two images is what is wanted."""
+    assert len(_sightings()) == 3
+    with pytest.raises(RecordingError, match="landmark 4 is seen twice in the image at 0 ns"):
+        _sightings(landmark_id=np.array([4, 4, 4]))
+    for name, value in (("stereo_px", np.full((3, 3), np.nan)), ("sigma_px", np.zeros(3))):
+        with pytest.raises(RecordingError, match="must be finite, and sigma_px above zero"):
+            _sightings(**{name: value})
+
+
 def test_arrays_of_a_stream_are_read_only() -> None:
     """Neither the arrays nor the fields can be set."""
     imu = ImuStream(np.arange(2), np.zeros((2, 3)), np.zeros((2, 3)))
