@@ -18,7 +18,13 @@ from estimators.slam import Slam
 from estimators.slam_spec import SlamSpec
 from lpet_sim.errors import UnknownNameError
 from lpet_sim.plugins.program import Program, ProgramSpec
-from lpet_sim.plugins.python_plugin import describe, plugin_builder, plugin_names
+from lpet_sim.plugins.python_plugin import (
+    PluginSpec,
+    describe,
+    plugin_builder,
+    plugin_code,
+    plugin_names,
+)
 from lpet_sim.spec import Spec
 
 Registry = dict[str, tuple[type[Spec], Callable[[Any], Estimator]]]
@@ -59,6 +65,19 @@ def estimator_kind(name: str) -> tuple[type[Spec], Callable[[Any], Estimator]]:
     if ":" not in name and name not in plugin_names():
         raise UnknownNameError("estimator", name, [*known, *plugin_names()])
     return describe(name).spec, plugin_builder(name)
+
+
+def outside_code(name: str, spec: dict[str, Any]) -> str:
+    """Name the code, as it is now, of an estimator that is not ours; empty for our own.
+
+    Args:
+        name: See `estimator_kind`.
+        spec: Its fields.
+    """
+    kind, _ = estimator_kind(name)
+    if issubclass(kind, ProgramSpec):
+        return kind.from_mapping(spec | {"code": ""}).code
+    return plugin_code(name) if issubclass(kind, PluginSpec) else ""
 
 
 def build_estimator(name: str, spec: dict[str, Any] | None = None) -> Estimator:

@@ -29,6 +29,7 @@ from lpet_sim.planning.reach_result import RateResult, ReachabilityReport
 from lpet_sim.planning.reach_run import run_reach
 from lpet_sim.planning.reach_spec import Case, ReachSpec, cases_of
 from lpet_sim.planning.search import search_straights
+from lpet_sim.sweep.kept_runs import code_key
 from lpet_sim.terrain.terrain import build_terrain
 from scenarios.reach.swept_body import disc_gets_there, touched
 
@@ -122,7 +123,8 @@ def check_terrain(case: Case, spec: ReachSpec) -> Row:
 
 def _checked(case: Case, spec: ReachSpec, folder: Path) -> Row:
     """Check a terrain once; its row is kept."""
-    digest = hashlib.sha256(f"{spec.model_dump_json()}{case.seed}".encode()).hexdigest()
+    code = code_key("lpet_sim/planning", "lpet_sim/terrain")
+    digest = hashlib.sha256(f"{spec.model_dump_json()}{case.seed}{code}".encode()).hexdigest()
     path = folder / f"{case.key}_{digest[:12]}.json"
     if not path.exists():
         row = check_terrain(case, spec)

@@ -28,6 +28,7 @@ from lpet_sim.datasets import data_path
 from lpet_sim.evaluation.figures import plot_plan_view, save
 from lpet_sim.outputs import output_folder, whole_file
 from lpet_sim.progress import Progress, track
+from lpet_sim.recording.kitti import BASELINE_M
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.recording.recording import Recording
 from lpet_sim.recording.starry_night import (
@@ -131,17 +132,18 @@ def night(arm: str, quick: bool) -> Recording:
 
 def kitti(progress: Progress) -> Recording:
     """Import and sight KITTI's pairs, or take what was made of them before."""
-    path = output_folder(KEPT) / f"kitti_{code_key('lpet_sim/vision')}.rrd"
+    path = output_folder(KEPT) / f"kitti_{code_key('lpet_sim/vision', 'lpet_sim/recording')}.rrd"
     if not path.exists():
         with whole_file(path) as temporary:
-            import_kitti(data_path("stereo/kitti00_first100"), temporary)
+            import_kitti(data_path("stereo/kitti00_first100"), temporary, baseline_m=BASELINE_M)
             sight_recording(temporary, temporary, FrontEndSpec(), progress)
     return read_recording(path)
 
 
 def run_all(jobs: list[Job], nights: dict[str, Recording], quick: bool) -> list[Row]:
     """Run what has not been run."""
-    sources = ("estimators", "lpet_sim/recording", "lpet_sim/geometry", "lpet_sim/vision")
+    rooms = ("recording", "geometry", "vision", "evaluation", "sweep")
+    sources = ("estimators", *(f"lpet_sim/{room}" for room in rooms))
     kept = output_folder(KEPT / f"{code_key(*sources)}{'_quick' * quick}")
     recordings = dict(nights)
     if any(job.data_set == "kitti" for job in jobs):

@@ -38,7 +38,8 @@ from lpet_sim.recording.streams import Measurements
 from lpet_sim.recording.trajectory import Trajectory
 
 MEASUREMENTS, ESTIMATE, COVARIANCE = "{measurements}", "{estimate}", "{covariance}"
-_NOT_NUMBERS: Final = ("nan", "inf")
+_NOT_FINITE: Final = re.compile(r"^(?!#).*(?<![a-z])(nan|inf)", re.IGNORECASE | re.MULTILINE)
+"""A row, no comment, with a word of C or Python for what is no number."""
 
 
 class ProgramSpec(LimitSpec):
@@ -49,14 +50,13 @@ class ProgramSpec(LimitSpec):
             ``{estimate}`` for the TUM file that it writes, ``{covariance}`` for a text file of 36
             numbers in each line, the covariance of each pose by rows, which it may write too.
             Programs and files in it are looked for from the folder where LPET is started.
-        needs: The streams without which it cannot run.
-        with_images: Whether images are written for it; they take time.
+        needs: The streams without which it cannot run; images are written for it, which takes
+            time, only if they are among them.
         code: Digest of the files in the command, filled in: rows of a sweep hang on it.
     """
 
     command: Annotated[tuple[str, ...], Field(min_length=1)] = ("./estimate",)
     needs: tuple[str, ...] = ()
-    with_images: bool = False
     code: str = ""
 
     @field_validator("command", mode="before")
@@ -120,10 +120,10 @@ class Program:
         with tempfile.TemporaryDirectory(prefix="lpet-") as made:
             work = Path(made) / "work"
             work.mkdir()
-            given, images = work / "measurements", self.spec.with_images
+            given, with_images = work / "measurements", "images" in self.spec.needs
             given.mkdir()
             write_measurements(
-                measurements if images else replace(measurements, images=None), given
+                measurements if with_images else replace(measurements, images=None), given
             )
             with _watched(given, work) as watch:
                 _run(found, work, self.spec, watch)
@@ -192,7 +192,7 @@ def _estimate_in(work: Path, name: str) -> Estimate:
     path = work / "estimate.txt"
     if not path.exists() or path.stat().st_size == 0:
         raise EstimatorFaultError(NO_OUTPUT, "it wrote no estimate")
-    if any(word in path.read_text(errors="replace").lower() for word in _NOT_NUMBERS):
+    if _NOT_FINITE.search(path.read_text(errors="replace")):
         raise EstimatorFaultError(NOT_FINITE, "a number of the estimate is not finite")
     try:
         trajectory = read_tum(path, EPOCH_NS)

@@ -64,9 +64,8 @@ def plugin_names() -> dict[str, str]:
     return {point.name: point.value for point in entry_points(group=GROUP)}
 
 
-@cache
 def describe(name: str) -> Description:
-    """Ask a plug-in's class, in a process of its own, what it is.
+    """Ask a plug-in's class, in a process of its own, what it is; again if it was changed.
 
     Args:
         name: Of an entry point, or ``module:Class`` of a class that can be imported from here.
@@ -75,6 +74,11 @@ def describe(name: str) -> Description:
         SpecError: It cannot be imported, or is no estimator.
     """
     value = plugin_names().get(name, name)
+    return _described(name, value, _digest(value))
+
+
+@cache
+def _described(name: str, value: str, code: str) -> Description:
     with tempfile.TemporaryDirectory(prefix="lpet-") as made:
         home = Path(made)
         answer, work = home / "work" / "answer.json", home / "work"
@@ -87,19 +91,24 @@ def describe(name: str) -> Description:
         told = json.loads(answer.read_text())
     if "fault" in told:
         raise SpecError(f"estimator '{name}' ({value}): {told['fault']['text']}")
-    return Description(value, tuple(told["needs"]), _spec_type(name, told["parameters"], value))
+    return Description(value, tuple(told["needs"]), _spec_type(name, told["parameters"], code))
 
 
-def _spec_type(name: str, parameters: dict[str, Any], value: str) -> type[PluginSpec]:
+def _spec_type(name: str, parameters: dict[str, Any], code: str) -> type[PluginSpec]:
     """Make the type of a plug-in's spec of the parameters of its class."""
     taken = set(PluginSpec.model_fields) & set(parameters)
     if taken:
         names = ", ".join(sorted(taken))
         raise SpecError(f"estimator '{name}': rename its parameter {names}, which LPET has itself")
     fields: dict[str, Any] = {key: (Any, default) for key, default in parameters.items()}
-    fields["code"] = (str, _digest(value))
+    fields["code"] = (str, code)
     made = create_model(f"{name.replace(':', '.')}Spec", __base__=PluginSpec, **fields)
     return cast("type[PluginSpec]", made)
+
+
+def plugin_code(name: str) -> str:
+    """Name the source of a plug-in as it is now."""
+    return _digest(plugin_names().get(name, name))
 
 
 def plugin_builder(name: str) -> Callable[[PluginSpec], PythonPlugin]:
@@ -178,12 +187,12 @@ def _environment(work: Path) -> dict[str, str]:
     kept = ("PATH", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "NUMBA_CACHE_DIR")
     threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     variables = {name: os.environ[name] for name in (*kept, *threads) if name in os.environ}
-    path = os.pathsep.join(_search_path())
+    path = os.pathsep.join(search_path())
     return variables | {"PYTHONPATH": path, "TMPDIR": str(work), "HOME": str(work)}
 
 
-def _search_path() -> list[str]:
-    """Give where modules are looked for: as here, and in the working folder."""
+def search_path() -> list[str]:
+    """Give where modules are looked for: as here, and in the folder where LPET was started."""
     return list(dict.fromkeys(str(Path(place or ".").resolve()) for place in [*sys.path, "."]))
 
 
@@ -193,12 +202,12 @@ def _confinement(value: str) -> Confinement:
     ours = [str(_HERE / name) for name in ("lpet_sim", "estimators")]
     kernels = [str(_HERE / "lpet_sim" / "__pycache__"), os.environ.get("NUMBA_CACHE_DIR", "")]
     writable = tuple(place for place in kernels if place)
-    return Confinement((*source, *ours, *_metadata()), tuple(_search_path()), writable)
+    return Confinement((*source, *ours, *_metadata()), tuple(search_path()), writable)
 
 
 def _metadata() -> list[str]:
     """Give what says which packages are installed: libraries look for their own plug-ins there."""
-    places = [Path(place) for place in _search_path()]
+    places = [Path(place) for place in search_path()]
     kinds = ("*.dist-info", "*.egg-info")
     return [str(found) for place in places for kind in kinds for found in place.glob(kind)]
 
@@ -206,7 +215,7 @@ def _metadata() -> list[str]:
 def _sources(value: str) -> list[Path]:
     """Give the folder of the package, or the file of the module, in which a plug-in lies."""
     top = value.partition(":")[0].partition(".")[0]
-    spec = PathFinder.find_spec(top, _search_path()) or importlib.util.find_spec(top)
+    spec = PathFinder.find_spec(top, search_path()) or importlib.util.find_spec(top)
     if spec is None:
         raise SpecError(
             f"there is no module '{top}': install it, or run where {top}.py lies; an estimator is "

@@ -66,6 +66,7 @@ def supervise(
     """
     told, said = folder.parent / f"{folder.name}.confinement.json", folder / "said.txt"
     told.write_text(json.dumps(_told(limits, confinement, folder)))
+    given_bytes = _size_bytes(folder)
     whole = [sys.executable, "-I", "-S", confine.__file__, str(told), *command]
     with said.open("wb") as file:
         process = subprocess.Popen(
@@ -78,12 +79,13 @@ def supervise(
             start_new_session=True,
         )
     try:
-        _watch(process, folder, limits, look)
+        _watch(process, folder, given_bytes, limits, look)
     finally:
         _end(process)
         _pass_on(said)
     look()
-    _judge(process.returncode, said, folder, limits)
+    _hold_to_output(folder, given_bytes, limits)
+    _judge(process.returncode, said, limits)
 
 
 def _told(limits: LimitSpec, confinement: Confinement, folder: Path) -> dict[str, object]:
@@ -98,7 +100,11 @@ def _told(limits: LimitSpec, confinement: Confinement, folder: Path) -> dict[str
 
 
 def _watch(
-    process: subprocess.Popen[bytes], folder: Path, limits: LimitSpec, look: Callable[[], None]
+    process: subprocess.Popen[bytes],
+    folder: Path,
+    given_bytes: int,
+    limits: LimitSpec,
+    look: Callable[[], None],
 ) -> None:
     end_s = time.monotonic() + limits.time_limit_s
     while True:
@@ -113,12 +119,20 @@ def _watch(
         if held > limits.memory_limit_mib:
             text = f"it held {held:.0f} MiB, more than its {limits.memory_limit_mib} MiB"
             raise EstimatorFaultError(MEMORY_LIMIT, text)
-        _hold_to_output(folder, limits)
+        _hold_to_output(folder, given_bytes, limits)
 
 
-def _hold_to_output(folder: Path, limits: LimitSpec) -> None:
-    written = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-    if written >= limits.output_limit_mib * MIB:
+def _size_bytes(folder: Path) -> int:
+    """Give the size of all files in a folder; one that goes away meanwhile has none."""
+    size = 0
+    for path in folder.rglob("*"):
+        with suppress(OSError):
+            size += path.stat().st_size if path.is_file() else 0
+    return size
+
+
+def _hold_to_output(folder: Path, given_bytes: int, limits: LimitSpec) -> None:
+    if _size_bytes(folder) - given_bytes >= limits.output_limit_mib * MIB:
         text = f"it wrote more than its {limits.output_limit_mib} MiB"
         raise EstimatorFaultError(OUTPUT_LIMIT, text)
 
@@ -150,13 +164,12 @@ def _pass_on(said: Path) -> None:
         _log.info("what the estimator printed:\n%s", text)
 
 
-def _judge(code: int, said: Path, folder: Path, limits: LimitSpec) -> None:
+def _judge(code: int, said: Path, limits: LimitSpec) -> None:
     """Tell how a program ended that was not stopped.
 
     Raises:
         EstimatorFaultError: Badly.
     """
-    _hold_to_output(folder, limits)
     if code == -signal.SIGXFSZ:
         text = f"it wrote a file larger than its {limits.output_limit_mib} MiB"
         raise EstimatorFaultError(OUTPUT_LIMIT, text)

@@ -21,6 +21,7 @@ from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.recording import Recording
 from lpet_sim.recording.streams import OdometryStream
 from lpet_sim.recording.truth import BodyTruth, Truth
+from lpet_sim.sweep.sweep_row import share_seen
 
 Row = dict[str, Any]
 
@@ -147,5 +148,5 @@ def _logged(estimate: Estimate) -> Row:
         row["rejected_share"] = float(log["rejected"].sum() / max(log["matched"].sum(), 1))
         row["dropped"] = int(np.sum(log["dropped"]))
     if "anchors_seen" in log:
-        row["anchors_seen_share"] = float(np.mean(log["anchors_seen"] > 0))
+        row["anchors_seen_share"] = share_seen(log["anchors_seen"])
     return row

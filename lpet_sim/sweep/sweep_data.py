@@ -16,6 +16,7 @@ from lpet_sim.outputs import whole_file
 from lpet_sim.progress import Progress, silent
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.recording.recording import Manifest, Recording
+from lpet_sim.rover.model_spec import identity_of
 from lpet_sim.sweep.simulate import simulate
 from lpet_sim.sweep.sweep_pool import Pool
 from lpet_sim.sweep.sweep_spec import DataSetsSpec
@@ -39,6 +40,7 @@ class DataSet:
         note: One sentence where the drive did not go as planned.
         left_out: Why no runs are made on it; empty where they are.
         stamp: Size and time of the file that was looked over.
+        origin: Names the traverse, rover and seed that drove it, where a sweep did.
     """
 
     name: str
@@ -50,6 +52,7 @@ class DataSet:
     note: str = ""
     left_out: str = ""
     stamp: tuple[int, int] = (0, 0)
+    origin: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +120,10 @@ def prepare_data_sets(
         RecordingError: A file is no recording, holds no truth, or was driven by another traverse.
     """
     known = {held.path: held for held in _listed(folder / LIST)}
-    current = [_if_current(known.get(d.path), d) for d in data_sets]
+    wanted = [replace(d, origin=_origin(spec.traverse, d.seed)) for d in data_sets]
+    current = [_if_current(known.get(d.path), d) for d in wanted]
     stale = [
-        _ToPrepare(d, spec.traverse) for d, held in zip(data_sets, current, strict=True) if not held
+        _ToPrepare(d, spec.traverse) for d, held in zip(wanted, current, strict=True) if not held
     ]
     ready = {held.path: held for held in current if held}
     progress(len(ready) / len(data_sets))
@@ -148,8 +152,10 @@ def _listed(path: Path) -> list[DataSet]:
 
 
 def _if_current(held: DataSet | None, data_set: DataSet) -> DataSet | None:
-    """Give what is known of a data set, if the file is still the one that was looked over."""
-    if held is None or not held.digest or held.name != data_set.name:
+    """Give what is known of a data set, if file and origin are still those looked over."""
+    if held is None or not held.digest:
+        return None
+    if (held.name, held.origin) != (data_set.name, data_set.origin):
         return None
     path = Path(data_set.path)
     return held if path.exists() and _stamp(path) == held.stamp else None
@@ -196,11 +202,24 @@ def _looked_over(data_set: DataSet, recording: Recording, traverse: TraverseSpec
 
 
 def _check_origin(path: Path, manifest: Manifest, traverse: TraverseSpec, seed: int | None) -> None:
-    if (manifest.specs.get("traverse"), manifest.seed) != (traverse.to_mapping(), seed):
+    said = [manifest.specs.get("traverse"), manifest.specs.get("rover_model"), manifest.seed]
+    if said != _made_by(traverse, seed):
         raise RecordingError(
-            f"{path} was driven by another traverse or seed; remove it, or give the sweep another "
-            "folder"
+            f"{path} was driven by another traverse, rover or seed; remove it, or give the sweep "
+            "another folder"
         )
+
+
+def _made_by(traverse: TraverseSpec, seed: int | None) -> list[Any]:
+    """Say what a drive hangs on, as its manifest does."""
+    return [traverse.to_mapping(), identity_of(traverse.rover.model), seed]
+
+
+def _origin(traverse: TraverseSpec | None, seed: int | None) -> str:
+    if traverse is None:
+        return ""
+    told = json.dumps(_made_by(traverse, seed), sort_keys=True)
+    return hashlib.sha256(told.encode()).hexdigest()[:16]
 
 
 def _long_enough(data_set: DataSet, min_path_m: float) -> DataSet:

@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from estimators import outside_code
 from estimators.odometry_steps import image_odometry
-from lpet_sim.errors import LpetError, RecordingError
+from lpet_sim.errors import LpetError, RecordingError, SpecError
 from lpet_sim.evaluation.bounds import end_bound
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.recording.recording import Recording
@@ -64,6 +65,7 @@ def run_job(job: Job) -> int:
     """
     if job.settings.is_local:
         _end_with_parent()
+    job.settings.find_modules()
     _check_worker(job)
     store = RowStore(job.settings.folder).refresh(job.key)
     missing = store.missing([run.key for run in job.runs], job.settings.redo)
@@ -90,6 +92,19 @@ def _check_worker(job: Job) -> None:
         )
 
 
+def _check_outside(run: PlannedRun) -> None:
+    """Hold an estimator that is not ours to be the one that the run was planned with."""
+    try:
+        code = outside_code(run.estimator, run.spec)
+    except SpecError:  # Its run tells what is wrong with it.
+        return
+    if code and code != run.spec["code"]:
+        raise LpetError(
+            f"estimator '{run.estimator}' was changed while the sweep ran: start it again, and it "
+            "runs what hangs on the change"
+        )
+
+
 def _run_all(job: Job, todo: Sequence[PlannedRun], wants_bound: bool, journal: Journal) -> None:
     scene: Scene | str
     try:
@@ -98,6 +113,7 @@ def _run_all(job: Job, todo: Sequence[PlannedRun], wants_bound: bool, journal: J
         _log.debug("job %s", job.key, exc_info=True)
         scene = f"before the run: {said(error)}"
     for run in todo:
+        _check_outside(run)
         journal.start(run.key, job.settings.driver)
         journal.row(run_row(run, scene, job.settings))
     if wants_bound:

@@ -6,8 +6,9 @@ import logging
 import math
 import os
 import socket
+import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from lpet_sim.errors import BrokenFilterError, EstimatorFaultError
 from lpet_sim.evaluation import EvaluationSpec, Requirement, RunResult, evaluate, failed
 from lpet_sim.evaluation.errors import distance_driven_m
 from lpet_sim.failures import BAD_COVARIANCE, EXCEPTION, TIMEOUT
+from lpet_sim.plugins.python_plugin import search_path
 from lpet_sim.recording.estimate import Estimate
 from lpet_sim.recording.streams import Measurements
 from lpet_sim.recording.truth import Truth
@@ -61,6 +63,7 @@ class RunSettings:
         code: Names the source code that the driver has, as `sweep_plan.code_digest` does.
         folder: Where rows are kept.
         is_local: Whether the workers are children of the driver, and end with it.
+        search_path: Where the driver looks for modules: estimators that are not ours.
     """
 
     requirement: Requirement
@@ -71,6 +74,12 @@ class RunSettings:
     code: str
     folder: Path
     is_local: bool = True
+    search_path: tuple[str, ...] = field(default_factory=lambda: tuple(search_path()))
+
+    def find_modules(self) -> None:
+        """Look for modules where the driver does; a worker may have been there before its call."""
+        if self.is_local:
+            sys.path += [place for place in self.search_path if place not in sys.path]
 
 
 @dataclass(frozen=True)

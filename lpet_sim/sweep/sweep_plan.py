@@ -24,11 +24,18 @@ _ROOT = Path(lpet_sim.__file__).resolve().parents[1]
 _RUN_CODE = (
     "estimators/**/*.py",
     "lpet_sim/geometry/*.py",
+    "lpet_sim/rng.py",
+    *(
+        f"lpet_sim/recording/{part}.py"
+        for part in ("arrays", "calibration", "estimate", "streams", "trajectory", "truth")
+    ),
+    "lpet_sim/formats/*.py",
     "lpet_sim/plugins/*.py",
     "lpet_sim/evaluation/errors.py",
     "lpet_sim/evaluation/result.py",
     "lpet_sim/evaluation/requirement.py",
     "lpet_sim/evaluation/consistency.py",
+    "lpet_sim/sweep/sweep_job.py",
     "lpet_sim/sweep/sweep_row.py",
     "lpet_sim/sweep/miscalibration.py",
 )
@@ -40,6 +47,7 @@ _SENSING_CODE = (
     "lpet_sim/sweep/carried.py",
     "lpet_sim/sweep/sensing.py",
 )
+_BOUND_CODE = ("lpet_sim/evaluation/bounds.py", "lpet_sim/evaluation/*_model.py")
 
 
 @dataclass(frozen=True)
@@ -157,11 +165,10 @@ def run_key(data_digest: str, arm: ArmSpec, variant: Variant, spec: SweepSpec) -
 
 def job_key(data_digest: str, arm: ArmSpec, spec: SweepSpec) -> str:
     """Name what the runs on one data set in one arm have in common, such as their bound."""
-    code = code_digest(arm.sensor is not None)
-    return digest([data_digest, arm.to_mapping(), spec.odometry, code])
+    code = [code_digest(arm.sensor is not None), _digest_of(_BOUND_CODE)]
+    return digest([data_digest, arm.to_mapping(), spec.odometry, *code])
 
 
-@cache
 def code_digest(sensing: bool) -> str:
     """Name the version and the source code that rows depend on.
 
@@ -170,7 +177,11 @@ def code_digest(sensing: bool) -> str:
     Args:
         sensing: Whether the rows depend on the landmark sensor and its ground, too.
     """
-    patterns = _RUN_CODE + (_SENSING_CODE if sensing else ())
+    return _digest_of(_RUN_CODE + (_SENSING_CODE if sensing else ()))
+
+
+@cache
+def _digest_of(patterns: tuple[str, ...]) -> str:
     found = hashlib.sha256(lpet_sim.__version__.encode())
     for path in (path for pattern in patterns for path in sorted(_ROOT.glob(pattern))):
         found.update(f"{path.relative_to(_ROOT)}\0{_bare(path.read_text())}\0".encode())

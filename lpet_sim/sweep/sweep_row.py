@@ -24,20 +24,22 @@ def variant_columns(estimator: str, spec: Mapping[str, Any]) -> dict[str, Any]:
     """Give the columns that tell what a run was made with.
 
     Time to live m and queue size n read `UNLIMITED` where there is no limit, as the paper's names.
+    What the paper's filter has is empty for any other estimator, whatever its fields are called.
 
     Args:
         estimator: The estimator's name.
         spec: Its whole spec.
     """
-    retention = spec.get("retention") or {}
+    filter_spec = spec if estimator == "slam" else {}
+    retention = filter_spec.get("retention") or {}
     return {
         "estimator": estimator,
         "m": retention.get("images", UNLIMITED),
         "n": retention.get("size", UNLIMITED),
         "retention": retention.get("kind", ""),
-        "coupling": spec.get("coupling", ""),
-        "observable": spec.get("anchors") is not None,
-        "formulation": spec.get("formulation", ""),
+        "coupling": filter_spec.get("coupling", ""),
+        "observable": filter_spec.get("anchors") is not None,
+        "formulation": filter_spec.get("formulation", ""),
     }
 
 
@@ -120,7 +122,7 @@ def diagnostic_columns(diagnostics: Mapping[str, Array]) -> dict[str, float]:
         "dropped_mean": _mean(diagnostics, "dropped"),
         "state_mean": _mean(diagnostics, "landmarks"),
         "state_max": float(np.max(diagnostics.get("landmarks", _NAN))),
-        "anchors_seen_share": _share(diagnostics, "anchors_seen"),
+        "anchors_seen_share": share_seen(diagnostics.get("anchors_seen")),
         "bridged_share": _share(diagnostics, "bridged"),
     }
 
@@ -131,6 +133,18 @@ def _mean(diagnostics: Mapping[str, Array], name: str) -> float:
 
 def _share(diagnostics: Mapping[str, Array], name: str) -> float:
     return float(np.mean(diagnostics[name] > 0)) if name in diagnostics else _NAN
+
+
+def share_seen(anchors_seen: Array | None) -> float:
+    """Give the share of images that see an anchor, from the first one that does.
+
+    Args:
+        anchors_seen: How many each image sees, Shape (n,); None gives NaN.
+    """
+    if anchors_seen is None:
+        return _NAN
+    seen = anchors_seen > 0
+    return float(np.mean(seen[np.argmax(seen) :])) if seen.any() else 0.0
 
 
 def _nis_per_dof(diagnostics: Mapping[str, Array]) -> float:

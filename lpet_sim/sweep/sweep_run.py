@@ -128,7 +128,7 @@ def _run_missing(
                 deaths = 0
         except WorkerDiedError:
             suspects, deaths = _suspects(jobs, settings), deaths + 1
-            if not suspects and deaths == _DEATHS_MAX:
+            if not suspects and deaths >= _DEATHS_MAX:
                 raise
             for job in suspects:
                 _run_alone(job, pool)

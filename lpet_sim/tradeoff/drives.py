@@ -59,6 +59,7 @@ def run_drive(drive: Drive) -> int:
     Returns:
         How many runs were run.
     """
+    drive.settings.find_modules()
     store = RowStore(drive.settings.folder).refresh(drive.key)
     todo = missing_runs(drive, store)
     if not todo:

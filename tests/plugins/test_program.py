@@ -19,6 +19,7 @@ from lpet_sim.recording.reader import read_measurements
 from lpet_sim.sweep.sweep_pool import Pool
 from lpet_sim.sweep.sweep_run import run_sweep
 from lpet_sim.sweep.sweep_spec import SweepSpec
+from tests.formats.samples import small
 from tests.plugins.examples import EXAMPLES, straight
 from tests.sweep.tiny_recordings import write_tiny
 
@@ -124,6 +125,22 @@ def test_a_program_that_goes_wrong_has_its_failure(
     with pytest.raises(EstimatorFaultError) as raised:
         built.estimate(read_measurements(recording))
     assert raised.value.kind == kind.split()[0], raised.value
+
+
+def test_words_in_a_comment_are_no_numbers(recording: Path, tmp_path: Path) -> None:
+    """Nanoseconds and information are not NaN and infinity."""
+    body = READS + f"b.write_text('# information, nanoseconds\\n' + {GOOD!r})"
+    built = build_estimator("program", {"command": script(tmp_path, body), **LIMITS})
+    assert len(built.estimate(read_measurements(recording)).trajectory) == 2
+
+
+@pytest.mark.parametrize("needs", [[], ["images"]])
+def test_images_are_written_for_a_program_that_needs_them(needs: list[str], tmp_path: Path) -> None:
+    """They are in the folder, or nothing of them is."""
+    body = READS + "sys.exit(str(any(a.rglob('*.png'))))"
+    spec = {"command": script(tmp_path, body), "needs": needs, **LIMITS}
+    with pytest.raises(EstimatorFaultError, match=str(bool(needs))):
+        build_estimator("program", spec).estimate(small().measurements)
 
 
 def test_a_program_finds_no_truth(recording: Path, tmp_path: Path) -> None:

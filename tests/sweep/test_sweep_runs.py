@@ -293,7 +293,6 @@ def test_the_command_drives_senses_and_sweeps(
     assert len(set(ends.values())) == 4
     assert "ran 0 runs, 6 were there" in lpet("sweep", spec, "--out", tmp_path / "out").out
     (tmp_path / "drive.yaml").write_text(TINY.replace("[0.3, 0]", "[0.4, 0]"))
-    (tmp_path / "out" / "data_sets.json").unlink()
     other = lpet("sweep", spec, "--out", tmp_path / "out")
     assert other.code == 2
-    assert "was driven by another traverse or seed" in other.err
+    assert "was driven by another traverse, rover or seed" in other.err
