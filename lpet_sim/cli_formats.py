@@ -46,13 +46,19 @@ def import_euroc(
 
 @import_app.command("kitti")
 def import_kitti(
-    folder: FolderArgument, out: RecordingOut, calibration: CalibrationOption = None
+    folder: FolderArgument,
+    out: RecordingOut,
+    calibration: CalibrationOption = None,
+    baseline_m: Annotated[
+        float | None,
+        typer.Option(min=1e-3, help="Distance between the eyes [m]; needed where K.txt is."),
+    ] = None,
 ) -> None:
     """Import a KITTI odometry sequence."""
     from lpet_sim.sweep.importing import import_kitti as run
 
     with bar(f"importing {folder.name}") as progress:
-        run(folder, out, progress, _declared(calibration))
+        run(folder, out, progress, _declared(calibration), baseline_m)
     wrote(out)
 
 

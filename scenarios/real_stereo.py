@@ -20,7 +20,7 @@ from estimators.frame_to_frame import FrameToFrame
 from lpet_sim.datasets import data_folder
 from lpet_sim.evaluation import evaluate
 from lpet_sim.recording.estimate import Estimate
-from lpet_sim.recording.kitti import body_poses
+from lpet_sim.recording.kitti import BASELINE_M, body_poses
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.recording.recording import Recording
 from lpet_sim.recording.trajectory import Trajectory
@@ -67,7 +67,7 @@ def main() -> None:
     options = parser.parse_args()
     folder = options.data or data_folder() / "stereo" / "kitti00_first100"
     run = options.out / "kitti00_first100.rrd"
-    import_kitti(folder, run)
+    import_kitti(folder, run, baseline_m=BASELINE_M)
     print(sight_recording(run, run, FrontEndSpec()))
     recording = read_recording(run)
     table = Table(title="end error: share of the distance, rotation")

@@ -23,6 +23,7 @@ from lpet_sim.formats.rectify import (
 from lpet_sim.formats.sensor_yaml import (
     camera_mappings,
     hold_to,
+    numbers_in,
     numbers_of,
     own_part,
     pose_of,
@@ -116,8 +117,8 @@ def _eye(path: Path, mapping: Mapping[str, Any]) -> Eye:
         )
     fu, fv, cu, cv = numbers_of(path, mapping, "intrinsics", 4).tolist()
     width, height = numbers_of(path, mapping, "resolution", 2).astype(int).tolist()
-    bent = list(mapping.get("distortion_coefficients") or [0.0] * 4)
+    bent = numbers_in(mapping.get("distortion_coefficients") or [0.0] * 4).ravel()
     if len(bent) not in ((4,) if model == "equidistant" else (4, 5)):
         raise RecordingError(f"{path}: 'distortion_coefficients' must hold 4 numbers")
-    coefficients = tuple(map(float, bent))
+    coefficients = tuple(bent.tolist())
     return Eye(pose_of(path, mapping), (fu, fv, cu, cv), model, coefficients, (width, height))

@@ -7,6 +7,7 @@ from typing import Any
 from lpet_sim.errors import RecordingError
 from lpet_sim.formats import ros_messages as ros
 from lpet_sim.formats.mcap_file import Bag
+from lpet_sim.formats.rectify import hold_equal
 from lpet_sim.formats.topics import TopicsSpec
 from lpet_sim.geometry import SE3
 from lpet_sim.recording.calibration import Calibration, PoseSpec, StereoCalibration
@@ -37,6 +38,7 @@ def _stereo(bag: Bag, where: TopicsSpec) -> StereoCalibration:
             f"{bag.path}: the projections of {where.left_info} and {where.right_info} are not "
             "those of a rectified pair; declare 'stereo' in a YAML file given by --calibration"
         )
+    hold_equal(f"{bag.path}, {where.left_info} and {where.right_info}", left.p, right.p)
     frame = _first(bag, where.left_image).header.frame_id
     return StereoCalibration(
         width_px=left.width,

@@ -15,8 +15,8 @@ from lpet_sim.formats.asl_cameras import from_stamp, read_cameras
 from lpet_sim.formats.beginning import counted_from, first_stamp, pose_at
 from lpet_sim.formats.csv_files import read_csv, read_stream
 from lpet_sim.formats.overrides import overridden
+from lpet_sim.formats.rows import poses_of
 from lpet_sim.formats.sensor_yaml import imu_of, own_part, read_mapping
-from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import ArrayStruct, Ints
 from lpet_sim.recording.calibration import (
     Calibration,
@@ -144,7 +144,7 @@ def _body(root: Path) -> BodyTruth | None:
     stamps, values = read_csv(table, _POSE_AND_VELOCITY)
     if not len(stamps):
         raise RecordingError(f"{table} holds no pose; leave the folder out where there is no truth")
-    poses = SE3.from_quat_wxyz(values[:, 3:7], values[:, :3])
+    poses = poses_of(table, values[:, 3:7], values[:, :3])
     return replace(BodyTruth.from_poses(stamps, poses), v_world_body_mps=values[:, 7:].copy())
 
 

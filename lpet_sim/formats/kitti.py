@@ -18,11 +18,13 @@ import numpy as np
 from lpet_sim.errors import RecordingError
 from lpet_sim.formats.clock import seconds_text, stamp_of_text
 from lpet_sim.formats.overrides import overridden
+from lpet_sim.formats.rectify import hold_equal
 from lpet_sim.geometry import SE3
 from lpet_sim.outputs import whole_folder
 from lpet_sim.progress import Progress, silent, track
 from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.recording.calibration import Calibration, PoseSpec, StereoCalibration
+from lpet_sim.recording.kitti import BASELINE_M as SEQUENCE_00_BASELINE_M
 from lpet_sim.recording.kitti import (
     GRAVITY_MPS2,
     R_BODY_CAMERA,
@@ -68,33 +70,63 @@ def export_kitti(recording: Recording, folder: Path, progress: Progress = silent
         _write_images(images, out, progress)
 
 
-def import_kitti(folder: Path, declared: Calibration | None = None) -> Recording:
+def import_kitti(
+    folder: Path, declared: Calibration | None = None, baseline_m: float | None = None
+) -> Recording:
     """Read a sequence; images stay on disk until they are asked for.
 
-    The body is the left camera's place with axes x forward, y left, z up; the world is the first
-    body.
+    The body is the left camera's place with axes x forward, y left, z up, unless the camera is
+    declared to sit elsewhere in it; the world is the first body.
 
     Args:
         folder: The sequence, in the benchmark's layout or the plainer one of
             `lpet_sim.recording.kitti`.
         declared: A calibration; what it sets stands in place of what the folder declares.
+        baseline_m: Distance between the eyes [m], likewise; the plainer layout does not say it.
 
     Raises:
-        RecordingError: The folder lacks a file, or its files do not fit together.
+        RecordingError: The folder lacks a file, its files do not fit together, or nothing says how
+            far apart the eyes are.
     """
-    if (folder / PLAIN_CALIBRATION).exists():
-        plain = import_plain(folder)
-        given = plain.measurements
-        calibration = overridden(given.calibration, declared)
-        return Recording(
-            plain.manifest, Measurements(calibration, images=given.images), plain.truth
+    read = _plain(folder, declared, baseline_m) if _is_plain(folder) else _benchmark(folder)
+    calibration = read.measurements.calibration
+    if baseline_m is not None and calibration.stereo is not None:
+        stereo = calibration.stereo.model_copy(update={"baseline_m": baseline_m})
+        calibration = calibration.model_copy(update={"stereo": stereo})
+    calibration = overridden(calibration, declared)
+    measurements = Measurements(calibration, images=read.measurements.images)
+    truth = None if read.truth is None else _mounted(read.truth, calibration.stereo)
+    return Recording(read.manifest, measurements, truth)
+
+
+def _is_plain(folder: Path) -> bool:
+    return (folder / PLAIN_CALIBRATION).exists()
+
+
+def _plain(folder: Path, declared: Calibration | None, baseline_m: float | None) -> Recording:
+    if baseline_m is None and (declared is None or declared.stereo is None):
+        raise RecordingError(
+            f"{folder / PLAIN_CALIBRATION} does not say how far apart the eyes are: give the "
+            f"baseline in metres ({SEQUENCE_00_BASELINE_M:.4f} for KITTI's sequence 00)"
         )
+    return import_plain(folder)
+
+
+def _benchmark(folder: Path) -> Recording:
     _check(folder)
     images = _images(folder)
     stated = Calibration(stereo=_stereo(folder, images), gravity_mps2=GRAVITY_MPS2)
     truth = _truth(folder, images.t_ns)
-    measurements = Measurements(overridden(stated, declared), images=images)
-    return Recording(Manifest(f"kitti {folder.name}"), measurements, truth)
+    return Recording(Manifest(f"kitti {folder.name}"), Measurements(stated, images=images), truth)
+
+
+def _mounted(truth: Truth, stereo: StereoCalibration | None) -> Truth:
+    """Give the truth of the body that the camera is declared to sit in."""
+    if stereo is None:
+        return truth
+    T_body_place = stereo.T_body_camera.se3() @ SE3(R_BODY_CAMERA, np.zeros(3)).inverse()
+    poses = T_body_place @ truth.body.T_world_body @ T_body_place.inverse()
+    return Truth(BodyTruth.from_poses(truth.body.t_ns, poses))
 
 
 def _write_text(path: Path, lines: Sequence[str]) -> None:
@@ -150,6 +182,7 @@ def _stereo(folder: Path, images: StereoFolder) -> StereoCalibration:
     left, right = (_projection(folder / CALIBRATION, f"P{eye}") for eye in (0, 1))
     if not right[3] < left[3]:
         raise RecordingError(f"{folder / CALIBRATION}: P1 must be that of the right eye")
+    hold_equal(str(folder / CALIBRATION), left.tolist(), right.tolist())
     height_px, width_px = read_grey(images.left[0]).shape
     return StereoCalibration(
         width_px=width_px,

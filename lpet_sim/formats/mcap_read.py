@@ -20,8 +20,7 @@ from lpet_sim.formats.bag_rows import Gathered, gather
 from lpet_sim.formats.beginning import counted_from, first_stamp, pose_at
 from lpet_sim.formats.mcap_file import Bag
 from lpet_sim.formats.overrides import overridden
-from lpet_sim.formats.rows import Layout, Struct, unpack
-from lpet_sim.geometry import SE3
+from lpet_sim.formats.rows import Layout, Struct, poses_of, unpack
 from lpet_sim.progress import Progress, silent
 from lpet_sim.recording.arrays import Ints
 from lpet_sim.recording.calibration import Calibration
@@ -215,7 +214,7 @@ def _body(rows: Gathered | None) -> BodyTruth | None:
     if rows is None:
         return None
     values = rows.table()
-    poses = SE3.from_quat_wxyz(values[:, 3:7], values[:, :3])
+    poses = poses_of("the bag's odometry of the truth", values[:, 3:7], values[:, :3])
     v_world = np.einsum("nij,nj->ni", poses.rotation, values[:, 7:10])
     return BodyTruth(rows.t_ns(), poses, v_world, values[:, 10:].copy())
 

@@ -12,6 +12,7 @@ Reference:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,7 @@ from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.recording.calibration import PoseSpec, StereoCalibration
 from lpet_sim.recording.streams import StereoImages
 
-_SAME = 1e-9
+_SAME, _SAME_TEXT = 1e-9, 1e-6
 DISTORTIONS = ("radial-tangential", "radtan", "plumb_bob", "equidistant", "none")
 
 
@@ -104,6 +105,27 @@ def are_rectified(left: Eye, right: Eye) -> bool:
     parallel = np.allclose(T_left_right.rotation, np.eye(3), atol=_SAME)
     level = aside[0] > 0 and np.all(np.abs(aside[1:]) < _SAME)
     return bool(square and equal and not straight and parallel and level)
+
+
+def hold_equal(source: str, left: Sequence[float], right: Sequence[float]) -> None:
+    """Hold two 3x4 projections, row by row, to be square and to differ by the baseline alone.
+
+    Args:
+        source: What they are from, for the message.
+        left: Projection of the left eye, Shape (12,).
+        right: That of the right one.
+
+    Raises:
+        RecordingError: Focal lengths or centres differ, so that disparities would be off.
+    """
+    pinholes = np.array([left, right], dtype=float)[:, [0, 5, 2, 6]]
+    wanted = pinholes[0, [0, 0, 2, 3]]
+    if not np.allclose(pinholes, wanted, rtol=_SAME_TEXT, atol=0.0):
+        said = " and ".join(" ".join(f"{number:g}" for number in eye) for eye in pinholes)
+        raise RecordingError(
+            f"{source}: fx fy cx cy of the eyes are {said} px; rectify both to one focal length "
+            "and one centre"
+        )
 
 
 def plain_stereo(left: Eye, right: Eye) -> StereoCalibration:

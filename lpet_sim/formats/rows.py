@@ -10,7 +10,8 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lpet_sim.errors import TimesError
+from lpet_sim.errors import RecordingError, TimesError
+from lpet_sim.geometry import SE3
 from lpet_sim.recording.arrays import Array, ArrayStruct, Ints
 from lpet_sim.recording.columns import Column, put_together, take_apart
 
@@ -77,6 +78,27 @@ def in_order(path: Path, stamps: Ints) -> Ints:
             f"{stamps[row]} ns does not come after {stamps[row - 1]} ns"
         )
     return stamps
+
+
+def poses_of(source: object, q_wxyz: Array, position_m: Array) -> SE3:
+    """Make poses of rows.
+
+    Args:
+        source: What the rows are from, for the message.
+        q_wxyz: Quaternions of any length but zero, Shape (n, 4).
+        position_m: Shape (n, 3).
+
+    Raises:
+        RecordingError: A quaternion is zero, or a number is not finite.
+    """
+    sound = np.isfinite(np.concatenate([q_wxyz, position_m], axis=1)).all(axis=1)
+    bad = np.flatnonzero(~(sound & (np.linalg.norm(q_wxyz, axis=1) > 0)))
+    if bad.size:
+        raise RecordingError(
+            f"{source}: pose {bad[0] + 1} has a quaternion of zeros, or a number that is not "
+            "finite; leave out what is not known"
+        )
+    return SE3.from_quat_wxyz(q_wxyz, position_m)
 
 
 def pack(struct: ArrayStruct) -> tuple[Layout, Array]:

@@ -110,7 +110,7 @@ def hold_to(path: Path, mapping: Mapping[str, Any], declared: Mapping[str, Any])
     for key, value in declared.items():
         if key not in mapping or key in (OWN_KEY, "comment", "rate_hz"):
             continue
-        mine, theirs = _numbers(value), _numbers(mapping[key])
+        mine, theirs = numbers_in(value), numbers_in(mapping[key])
         if mine.shape != theirs.shape or not np.allclose(mine, theirs, _AGREEMENT, _AGREEMENT):
             raise RecordingError(
                 f"{path}: '{key}' and the part under '{OWN_KEY}' contradict each other; change "
@@ -124,8 +124,8 @@ def pose_of(path: Path, mapping: Mapping[str, Any]) -> SE3:
     Raises:
         RecordingError: It is missing, or not 16 numbers.
     """
-    data = numbers_of(path, {"T_BS": (mapping.get("T_BS") or {}).get("data", [])}, "T_BS", 16)
-    matrix = data.reshape(4, 4)
+    data = {"T_BS": numbers_in(mapping.get("T_BS", [])).ravel()}
+    matrix = numbers_of(path, data, "T_BS", 16).reshape(4, 4)
     return SE3(_nearest_rotation(matrix[:3, :3]), matrix[:3, 3])
 
 
@@ -135,7 +135,7 @@ def numbers_of(path: Path, mapping: Mapping[str, Any], key: str, count: int) -> 
     Raises:
         RecordingError: It is missing, or of another length.
     """
-    found = _numbers(mapping.get(key, []))
+    found = numbers_in(mapping.get(key, []))
     if found.shape != (count,) or not np.all(np.isfinite(found)):
         wanted = "a number" if count == 1 else f"{count} numbers"
         raise RecordingError(f"{path}: '{key}' must be {wanted}")
@@ -182,7 +182,7 @@ def _camera(
     }
 
 
-def _numbers(value: Any) -> Array:
+def numbers_in(value: Any) -> Array:
     """Give the numbers of a value; of a word, none."""
     data = value.get("data", []) if isinstance(value, dict) else value
     try:

@@ -37,7 +37,11 @@ def import_euroc(
 
 
 def import_kitti(
-    folder: Path, path: Path, progress: Progress = silent, declared: Calibration | None = None
+    folder: Path,
+    path: Path,
+    progress: Progress = silent,
+    declared: Calibration | None = None,
+    baseline_m: float | None = None,
 ) -> None:
     """Make a recording of a KITTI odometry sequence.
 
@@ -48,12 +52,13 @@ def import_kitti(
         path: The recording to write, ending in .rrd.
         progress: Called after each pair.
         declared: A calibration; what it sets stands in place of what the folder declares.
+        baseline_m: Distance between the eyes [m], likewise; ``K.txt`` does not say it.
 
     Raises:
-        RecordingError: The folder is not such a sequence.
+        RecordingError: The folder is not such a sequence, or nothing says the baseline.
         OutputError: The file cannot be written.
     """
-    _write(read_kitti(folder, declared), path, progress)
+    _write(read_kitti(folder, declared, baseline_m), path, progress)
 
 
 def import_tum(file: Path, path: Path) -> None:

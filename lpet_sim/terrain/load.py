@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from lpet_sim.errors import UnknownNameError
 from lpet_sim.soil.load import soil_beside
@@ -36,9 +37,8 @@ def load_terrain_spec(name_or_path: str | Path) -> TerrainSpec:
     path = Path(name_or_path)
     if not path.exists() and path.suffix not in (".yaml", ".yml"):
         raise UnknownNameError("terrain preset", text, preset_names())
-    folder = path.resolve().parent
-    spec = TerrainSpec.from_mapping(with_local_soils(read_yaml(path), folder), source=str(path))
-    return _with_local_dem(spec, folder)
+    mapping = with_local_files(read_yaml(path), path.resolve().parent)
+    return TerrainSpec.from_mapping(mapping, source=str(path))
 
 
 def named_terrain(value: object) -> object:
@@ -49,31 +49,29 @@ def named_terrain(value: object) -> object:
 def terrain_beside(terrain: object, folder: Path) -> object:
     """Find the files that a terrain as read from YAML names, where they lie in a folder."""
     if not isinstance(terrain, str):
-        return with_local_soils(terrain, folder)
+        return with_local_files(terrain, folder)
     return str(folder / terrain) if (folder / terrain).is_file() else terrain
 
 
-def with_local_soils(mapping: object, folder: Path) -> object:
-    """Give a terrain's mapping with the soils that are named by a file in a folder found there.
+def with_local_files(mapping: Any, folder: Path) -> Any:
+    """Give a terrain's mapping with the soils and the DEM that lie in a folder found there.
 
     Args:
         mapping: A terrain as read from YAML; anything else comes back as it is.
         folder: Where relative paths begin.
     """
-    soils = mapping.get("soils") if isinstance(mapping, dict) else None
-    if not isinstance(mapping, dict) or not isinstance(soils, list):
+    if not isinstance(mapping, dict):
         return mapping
-    return mapping | {"soils": [_with_local_soil(soil, folder) for soil in soils]}
+    found, soils, dem = dict(mapping), mapping.get("soils"), mapping.get("dem")
+    if isinstance(soils, list):
+        found["soils"] = [_with_local_soil(soil, folder) for soil in soils]
+    path = dem.get("path") if isinstance(dem, dict) else None
+    if isinstance(dem, dict) and isinstance(path, str) and (folder / path).is_file():
+        found["dem"] = dem | {"path": str(folder / path)}
+    return found
 
 
 def _with_local_soil(soil_class: object, folder: Path) -> object:
     if not isinstance(soil_class, dict) or "soil" not in soil_class:
         return soil_class
     return soil_class | {"soil": soil_beside(soil_class["soil"], folder)}
-
-
-def _with_local_dem(spec: TerrainSpec, folder: Path) -> TerrainSpec:
-    if spec.dem is None or not (folder / spec.dem.path).exists():
-        return spec
-    dem = spec.dem.model_copy(update={"path": str(folder / spec.dem.path)})
-    return spec.model_copy(update={"dem": dem})

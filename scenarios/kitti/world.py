@@ -14,7 +14,7 @@ from lpet_sim.evaluation.sighting_tracks import CameraPath
 from lpet_sim.evaluation.track_kernels import Flags
 from lpet_sim.recording.arrays import Array, Ints
 from lpet_sim.recording.calibration import Calibration, PoseSpec, StereoCalibration
-from lpet_sim.recording.kitti import GRAVITY_MPS2
+from lpet_sim.recording.kitti import BASELINE_M, GRAVITY_MPS2
 from lpet_sim.recording.reader import read_recording
 from lpet_sim.recording.recording import Recording
 from lpet_sim.recording.streams import SightingStream
@@ -57,7 +57,7 @@ def sighted(folder: Path) -> Drive:
     run = CACHE / "kitti00_first100.rrd"
     done = run.exists() and read_recording(run).measurements.sightings is not None
     if not done:
-        import_kitti(folder, run)
+        import_kitti(folder, run, baseline_m=BASELINE_M)
         sight_recording(run, run, FrontEndSpec())
     recording: Recording = read_recording(run)
     measurements = recording.measurements

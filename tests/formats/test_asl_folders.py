@@ -153,6 +153,7 @@ DAMAGES = {
     "events that are none": ("mav0/lpet_truth0/events.json", "{", "is not valid JSON"),
     "events that are a number": ("mav0/lpet_truth0/events.json", "1", "is no list of events"),
     "an event of others": ("mav0/lpet_truth0/events.json", '[{"a": 1}]', "is no list of events"),
+    "no attitude": ("mav0/state_groundtruth_estimate0/data.csv", f"1{',0' * 16}\n", "pose 1 has"),
     "an empty table": ("mav0/imu0/data.csv", "", "is empty; leave the folder out"),
 }
 
@@ -193,6 +194,20 @@ def test_a_unit_of_others_without_readings_is_refused(exported: Path) -> None:
         import_euroc(folder)
     shutil.rmtree(folder / "mav0/imu0")
     assert import_euroc(folder).measurements.imu is None
+
+
+def test_other_ways_to_write_a_matrix_and_coefficients_are_read(exported: Path) -> None:
+    """Nested lists, as Kalibr has them, and matrices as OpenCV writes them."""
+    root = as_of_others(exported) / "mav0"
+    paths = [root / eye / "sensor.yaml" for eye in ("cam0", "cam1")]
+    plain = import_euroc(exported).measurements.calibration.stereo
+    for path in paths:
+        said = yaml.safe_load(path.read_text())
+        said["T_BS"] = np.reshape(said["T_BS"]["data"], (4, 4)).tolist()
+        bent = said.get("distortion_coefficients", [0.0] * 4)
+        said["distortion_coefficients"] = {"rows": 1, "cols": 4, "dt": "d", "data": bent}
+        path.write_text(yaml.safe_dump(said))
+    assert import_euroc(exported).measurements.calibration.stereo == plain
 
 
 def test_a_calibration_that_contradicts_itself_is_refused(exported: Path) -> None:

@@ -21,6 +21,7 @@ from lpet_sim.recording.recording import Recording
 from lpet_sim.rng import stream
 from tests.formats.samples import small
 from tests.recording.synthetic import estimate
+from tests.recording.test_kitti_import import make_folder
 
 
 def test_stamps_go_to_text_and_back_to_the_nanosecond() -> None:
@@ -138,6 +139,10 @@ def test_a_sequence_without_poses_has_no_truth(tmp_path: Path) -> None:
 
 KITTI_DAMAGES = {
     "calib.txt": ("P0: 1 2 3\n", "12 numbers"),
+    "calib.txt of unequal eyes": (
+        "P0: 100 0 32 0 0 100 24 0 0 0 1 0\nP1: 100 0 40 -20 0 100 24 0 0 0 1 0\n",
+        "rectify both to one focal length",
+    ),
     "times.txt": ("0.0\n0.5\n", "9 image pairs but 2 times"),
     "poses.txt": ("1 0 0 0 0 1 0 0 0 0 1 0\n", "9 image pairs but 1 poses"),
 }
@@ -148,9 +153,32 @@ def test_what_is_wrong_with_a_sequence_is_said(name: str, tmp_path: Path) -> Non
     """With the file or the counts."""
     export_kitti(small(), tmp_path / "kitti")
     text, said = KITTI_DAMAGES[name]
-    (tmp_path / "kitti" / name).write_text(text)
+    (tmp_path / "kitti" / name.split()[0]).write_text(text)
     with pytest.raises(RecordingError, match=said):
         import_kitti(tmp_path / "kitti")
+
+
+def test_a_folder_that_does_not_say_its_baseline_asks_for_it(tmp_path: Path) -> None:
+    """A camera matrix alone has no scale; what is given is taken."""
+    folder = make_folder(tmp_path)
+    with pytest.raises(RecordingError, match="does not say how far apart the eyes are"):
+        import_kitti(folder)
+    stereo = import_kitti(folder, baseline_m=0.12).measurements.calibration.stereo
+    assert stereo is not None and stereo.baseline_m == 0.12
+
+
+def test_the_truth_is_of_the_body_that_the_camera_is_declared_to_sit_in(tmp_path: Path) -> None:
+    """A drive of our own, out and in with its camera's mount: the true motion comes back."""
+    given = small()
+    export_kitti(given, tmp_path / "kitti")
+    stereo = given.measurements.calibration.stereo
+    assert given.truth is not None and given.measurements.images is not None
+    back = import_kitti(tmp_path / "kitti", Calibration(stereo=stereo)).truth
+    assert back is not None
+    true = given.truth.trajectory.at(given.measurements.images.t_ns)
+    moved = true[0].inverse() @ true
+    off = back.body.T_world_body.inverse() @ moved
+    assert np.abs(off.log()).max() < 1e-9
 
 
 def test_a_sequence_that_lacks_a_file_is_told_what_there_should_be(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from lpet_sim.datasets import DataError, data_path
 from lpet_sim.errors import SpecError
 from lpet_sim.recording.arrays import Array
 from lpet_sim.rng import stream
+from lpet_sim.sweep.traverse import TraverseSpec
 from lpet_sim.terrain.dem import read_dem
 from lpet_sim.terrain.load import load_terrain_spec
 from lpet_sim.terrain.spec import DemSpec, ReliefSpec, TerrainSpec
@@ -134,6 +135,18 @@ def test_dem_goes_over_into_relief_without_a_step(tmp_path: Path) -> None:
     normal = terrain.normal(line)
     slope = np.gradient(z, 0.1)
     assert -normal[1:-1, 0] / normal[1:-1, 2] == pytest.approx(slope[1:-1], abs=2e-3)
+
+
+def test_a_dem_is_found_beside_the_yaml_of_a_terrain_and_of_a_traverse(tmp_path: Path) -> None:
+    """Whether the terrain has a file of its own or stands within another."""
+    (tmp_path / "site.tif").touch()
+    (tmp_path / "terrain.yaml").write_text("dem: {path: site.tif}\n")
+    inline = "terrain: {dem: {path: site.tif}}\ndrive: {waypoints_m: [[0, 0], [1, 0]]}\n"
+    (tmp_path / "traverse.yaml").write_text(inline)
+    own = load_terrain_spec(tmp_path / "terrain.yaml")
+    within = TraverseSpec.from_yaml(tmp_path / "traverse.yaml").terrain
+    for spec in (own, within):
+        assert spec.dem is not None and spec.dem.path == str(tmp_path / "site.tif")
 
 
 def test_a_missing_dem_is_named() -> None:
